@@ -1,0 +1,30 @@
+# Helpers that give every target of the package the same warnings, includes and install rules.
+
+if(UNIRIT_SANITIZE)
+  add_compile_options(-fsanitize=address,undefined -fno-sanitize-recover=undefined
+                      -fno-omit-frame-pointer -g1)
+  add_link_options(-fsanitize=address,undefined)
+endif()
+
+function(unirit_configure target)
+  target_compile_options(${target} PRIVATE -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor)
+  if(UNIRIT_WERROR)
+    target_compile_options(${target} PRIVATE -Werror)
+  endif()
+  target_include_directories(${target} PUBLIC
+    $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/include> $<INSTALL_INTERFACE:include>)
+endfunction()
+
+function(unirit_add_library target)
+  add_library(${target} ${ARGN})
+  unirit_configure(${target})
+  install(TARGETS ${target}
+    ARCHIVE DESTINATION ${UNIRIT_LIBRARY_DESTINATION}
+    LIBRARY DESTINATION ${UNIRIT_LIBRARY_DESTINATION})
+endfunction()
+
+function(unirit_add_tool target)
+  add_executable(${target} ${ARGN})
+  unirit_configure(${target})
+  install(TARGETS ${target} RUNTIME DESTINATION ${UNIRIT_BINARY_DESTINATION})
+endfunction()

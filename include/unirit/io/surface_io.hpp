@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "unirit/point_cloud.hpp"
+
+namespace unirit {
+
+/// A surface as read from a file.
+struct SurfaceFile {
+  Surface surface;                            ///< in metres; normals only if the file has them
+  std::optional<Eigen::Vector3f> viewpoint;   ///< where the sensor stood, if a PCD says so [m]
+  Eigen::Index dropped = 0;                   ///< points that were not finite (faces go with them)
+};
+
+/// Reads PLY, PCD, STL or OBJ (by extension, any case); meshes and bare clouds, ASCII and binary;
+/// further properties are skipped. `unit` is the file's unit in metres (0.001 for millimetres).
+/// Throws std::runtime_error with a sentence naming the file and what is wrong with it: missing,
+/// unknown extension, damaged, empty.
+SurfaceFile readSurface(const std::string& path, double unit);
+
+/// Writes a binary PLY in the given unit: vertices in their order, normals where present, faces.
+/// Throws std::runtime_error naming the file where it cannot be written.
+void writePly(const Surface& surface, const std::string& path, double unit);
+
+}  // namespace unirit

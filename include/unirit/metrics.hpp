@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "unirit/point_cloud.hpp"
+
+namespace unirit {
+
+/// Distance of each cloud point to the moved surface. A residual, not an accuracy: it says nothing
+/// about motion along the surface, nor about what was not seen.
+struct SurfaceResidual {
+  double rms = 0.0;              ///< [m]
+  double median = 0.0;           ///< [m]
+  double p95 = 0.0;              ///< 95th percentile [m]
+  double inlier_fraction = 0.0;  ///< share of cloud points within the inlier tolerance
+  double coverage = 0.0;         ///< share of the organ's points with a cloud point nearby
+};
+
+/// The non-rigid displacement over the organ's points.
+struct DisplacementStatistics {
+  double rms = 0.0;              ///< [m]
+  double p95 = 0.0;              ///< [m]
+  double max = 0.0;              ///< [m]
+  double folded_fraction = 0.0;  ///< share of points where the Jacobian determinant is <= 0
+};
+
+/// Root mean square distance between points of the same column [m]. Throws std::invalid_argument
+/// where the sizes differ or are zero.
+double rootMeanSquareDistance(const Points& a, const Points& b);
+
+/// Distance from each point of `from` to its nearest point of `to` [m], a row of from.cols().
+Eigen::RowVectorXf nearestDistances(const Points& from, const Points& to);
+
+SurfaceResidual surfaceResidual(const Points& moved_surface, const Points& cloud,
+                                double inlier_tolerance);
+
+/// `rigid`: the organ's points moved rigidly, 3 x N; `displacements`: what the non-rigid part adds.
+DisplacementStatistics displacementStatistics(const Points& rigid, const Points& displacements);
+
+}  // namespace unirit

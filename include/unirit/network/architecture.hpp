@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <array>
+#include <string>
+#include <vector>
+
+#include "unirit/settings.hpp"
+
+namespace unirit {
+
+/// Widths of the UniRiT network (Li et al., arXiv 2410.22909, section 4.2, and the FLOP counts of
+/// its table 1). Every layer but a decoder's last is followed by a ReLU; no normalisation layers.
+inline constexpr std::array<int, 6> kEncoderWidths{3, 64, 64, 64, 128, 1024};
+inline constexpr std::array<int, 7> kRigidDecoderWidths{2048, 1024, 1024, 512, 512, 256, 7};
+inline constexpr std::array<int, 6> kNonRigidDecoderHiddenWidths{1024, 512, 256, 128, 64, 3};
+inline constexpr int kFeatureSize = 1024;
+
+/// Inputs of the non-rigid decoder: point (3), two global features (2048), paired row (3 or none).
+constexpr int nonRigidDecoderInputs(Pairing pairing) {
+  return 3 + 2 * kFeatureSize + (pairing == Pairing::kNone ? 0 : 3);
+}
+
+/// One fully connected layer as it stands in a weights file: tensors NAME.weight, row-major
+/// [outputs, inputs], and NAME.bias, [outputs].
+struct LayerShape {
+  std::string name;
+  int inputs = 0;
+  int outputs = 0;
+};
+
+/// All layers in the file's order: rigid.source_encoder.0 to .4, rigid.target_encoder.0 ...,
+/// rigid.decoder.0 to .5, nonrigid.source_encoder, nonrigid.target_encoder, nonrigid.decoder.
+/// The columns of nonrigid.decoder.0 are: point, source feature, target feature, paired row.
+std::vector<LayerShape> layerShapes(Pairing pairing);
+
+}  // namespace unirit

@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Geometry>
+#include <memory>
+
+#include "unirit/network/weights.hpp"
+#include "unirit/point_cloud.hpp"
+#include "unirit/settings.hpp"
+
+namespace unirit {
+
+/// Similarity that takes metres to the network's unit: (p - offset) / scale.
+struct Normalisation {
+  Eigen::Vector3f offset = Eigen::Vector3f::Zero();  ///< centroid of the source [m]
+  float scale = 1.0F;                                ///< its largest absolute coordinate [m]
+
+  /// Of a source cloud; throws std::invalid_argument where it is empty or a single point.
+  static Normalisation of(const Points& source);
+  Points apply(const Points& points) const;
+};
+
+/// The forward pass of UniRiT in the network's own unit. Holds buffers that grow to the largest
+/// clouds seen and then allocates no more; not thread-safe, use one per thread. The same input
+/// gives the same bits for any number of threads.
+class Network {
+ public:
+  /// Throws std::invalid_argument where settings.pairing is not the weights' own.
+  Network(std::shared_ptr<const Weights> weights, const NetworkSettings& settings, int threads);
+  ~Network();
+  Network(Network&&) noexcept;
+  Network& operator=(Network&&) noexcept;
+
+  /// Rigid module: the transform that takes `source` to `target` (3 x N and 3 x M, N and M free).
+  /// `iterates`, if given, gets the accumulated transform after each iteration (for tests).
+  Eigen::Isometry3f estimateRigid(const Points& source, const Points& target,
+                                  std::vector<Eigen::Isometry3f>* iterates = nullptr);
+
+  /// Non-rigid module: displacement of each of `queries` (3 x Q) given the rigidly moved `source`
+  /// and `target`. With pairing row, queries must be the source and of the target's size.
+  Points estimateDisplacements(const Points& source, const Points& target, const Points& queries);
+
+  /// Global features of the last call, 2 x 1024 (source, target), for the golden-state test.
+  const Eigen::VectorXf& rigidFeatures() const;
+  const Eigen::VectorXf& nonRigidFeatures() const;
+
+  const Weights& weights() const;
+
+ private:
+  struct Implementation;
+  std::unique_ptr<Implementation> implementation_;
+};
+
+/// Multiply-adds of one forward pass with n rigid iterations, as published and with the two exact
+/// savings (target feature once; the decoder's global columns once per pair).
+double multiplyAdds(Eigen::Index source_points, Eigen::Index target_points, int rigid_iterations,
+                    Pairing pairing, bool with_savings);
+
+}  // namespace unirit

@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Geometry>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "unirit/metrics.hpp"
+#include "unirit/point_cloud.hpp"
+#include "unirit/settings.hpp"
+#include "unirit/status.hpp"
+
+namespace unirit {
+
+struct Registration;
+
+/// Why a cloud cannot be registered, as a sentence that begins with `name`: too few points, all on
+/// one line or in one plane. Nothing where the cloud is fit.
+std::optional<std::string> findFault(const PointCloud& cloud, const std::string& name,
+                                     const PlausibilitySettings& settings);
+
+/// Why the two clouds cannot belong together: an extent off by about 1000 (millimetres taken for
+/// metres or the reverse) or outside the settings' range.
+std::optional<std::string> findMismatch(const PointCloud& preoperative,
+                                        const PointCloud& intraoperative,
+                                        const PlausibilitySettings& settings);
+
+/// Checks of a finished registration: finite, rotation valid, residual, displacement.
+std::vector<Check> checkOutput(const Registration& registration, double organ_extent,
+                               const PlausibilitySettings& settings);
+
+/// Checks of the new pose against the last accepted one, measured at the organ's centroid.
+std::vector<Check> checkJump(const Eigen::Isometry3d& pose, const Eigen::Isometry3d& accepted,
+                             const Eigen::Vector3d& organ_centroid,
+                             const PlausibilitySettings& settings);
+
+/// Appends the checks; the first failed one turns a succeeded registration into a refused one and
+/// writes the sentence.
+void applyChecks(const std::vector<Check>& checks, Registration& registration);
+
+}  // namespace unirit

@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Geometry>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "unirit/deformation.hpp"
+#include "unirit/metrics.hpp"
+#include "unirit/network/network.hpp"
+#include "unirit/point_cloud.hpp"
+#include "unirit/settings.hpp"
+#include "unirit/status.hpp"
+
+namespace unirit {
+
+struct StageTime {
+  std::string stage;
+  double milliseconds = 0.0;
+};
+
+/// What a registration found, and how far it can be believed.
+struct Registration {
+  Status status = Status::kFailed;
+  std::string message;  ///< one sentence, names the cause
+  /// Rigid part, pre-operative to intra-operative frame; identity unless succeeded or refused.
+  Eigen::Isometry3d T_intraoperative_preoperative = Eigen::Isometry3d::Identity();
+  std::shared_ptr<const Deformation> deformation;  ///< null unless succeeded or refused
+  SurfaceResidual residual;                        ///< moved surface against the cloud
+  DisplacementStatistics displacement;             ///< non-rigid part over the organ
+  std::vector<Check> checks;
+  std::vector<StageTime> stages;
+
+  bool succeeded() const { return status == Status::kSucceeded; }
+};
+
+/// Registers a pre-operative surface to an intra-operative cloud: the page a user of the library
+/// reads. Keeps buffers and the sampled organ between calls, so use one Registrar per thread.
+class Registrar {
+ public:
+  /// Throws std::invalid_argument where settings are out of range or do not fit the weights.
+  Registrar(std::shared_ptr<const Weights> weights, const RegistrationSettings& settings);
+  ~Registrar();
+
+  /// `guess` takes the pre-operative frame to the intra-operative one. Clouds may have any number
+  /// of points, in any order; points that are not finite are dropped. Never throws on bad clouds:
+  /// the status and sentence say what is wrong.
+  Registration registerClouds(const PointCloud& preoperative, const PointCloud& intraoperative,
+                              const Eigen::Isometry3d& guess);
+
+  const RegistrationSettings& settings() const;
+
+  /// New settings for the next call; throws as the constructor does, and then keeps the old ones.
+  void setSettings(const RegistrationSettings& settings);
+
+ private:
+  struct Implementation;
+  std::unique_ptr<Implementation> implementation_;
+};
+
+/// A start for clouds whose frames have nothing in common: the translation between centroids.
+Eigen::Isometry3d alignCentroids(const PointCloud& preoperative, const PointCloud& intraoperative);
+
+}  // namespace unirit

@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace unirit {
+
+/// What stands in for the target's row in the non-rigid decoder's input.
+enum class Pairing {
+  kNearest,  ///< offset to the nearest target point: independent of the order of either cloud
+  kNone,     ///< nothing, as in the Free Point Transformer
+  kRow,      ///< row i of the target, as published; only to reproduce the published tables
+};
+
+/// The stages of a registration, in their order.
+enum class Stage { kRigid, kNonRigid };
+
+/// How the clouds are brought to the network.
+struct SamplingSettings {
+  int points = 1024;  ///< points kept of each cloud; smaller clouds are taken whole
+};
+
+/// How the network is run.
+struct NetworkSettings {
+  int rigid_iterations = 8;             ///< n of the paper's rigid module
+  Pairing pairing = Pairing::kNearest;  ///< must be the one the weights were trained with
+};
+
+/// Limits outside of which a registration is refused. Lengths relative to the organ's extent hold
+/// for organs of any size.
+struct PlausibilitySettings {
+  int min_points = 50;                  ///< points in either cloud, after invalid ones are dropped
+  double min_thickness = 0.005;         ///< second and third principal deviation over the first
+  double min_extent_ratio = 0.1;        ///< extent of the intra-operative cloud over the organ's
+  double max_extent_ratio = 3.0;        ///< same, from above
+  double inlier_tolerance = 0.005;      ///< cloud points nearer than this are inliers [m]
+  double max_residual = 0.06;           ///< rms distance of cloud to moved surface, over extent
+  double max_displacement = 0.35;       ///< largest non-rigid displacement, over extent
+  double max_jump_translation = 0.10;   ///< from the last accepted pose, at the organ's centroid [m]
+  double max_jump_rotation = 60.0;      ///< from the last accepted pose [degree]
+};
+
+/// Everything the core can be told.
+struct RegistrationSettings {
+  std::vector<Stage> stages{Stage::kRigid, Stage::kNonRigid};
+  SamplingSettings sampling;
+  NetworkSettings network;
+  PlausibilitySettings plausibility;
+  int threads = 2;  ///< worker threads of the network; the result has the same bits for any number
+};
+
+const char* toString(Pairing pairing);
+const char* toString(Stage stage);
+
+/// Parse the names that toString gives. Throw std::invalid_argument naming the unknown word.
+Pairing pairingFromString(const std::string& name);
+std::vector<Stage> stagesFromString(const std::string& comma_separated);
+std::string toString(const std::vector<Stage>& stages);
+
+/// The one list of settings: calls visitor(name, value, minimum, maximum, description) for every
+/// number. YAML files, ROS parameters, dynamic_reconfigure and the settings' hash are read off it.
+template <class Settings, class Visitor>
+void visitSettings(Settings& settings, Visitor&& visitor) {
+  auto& p = settings.plausibility;
+  visitor("threads", settings.threads, 1, 64, "worker threads of the network");
+  visitor("sampling/points", settings.sampling.points, 64, 16384, "points kept of each cloud");
+  visitor("network/rigid_iterations", settings.network.rigid_iterations, 1, 32,
+          "iterations of the rigid module");
+  visitor("plausibility/min_points", p.min_points, 4, 100000, "fewest points in either cloud");
+  visitor("plausibility/min_thickness", p.min_thickness, 0.0, 1.0,
+          "second and third principal deviation over the first, at least");
+  visitor("plausibility/min_extent_ratio", p.min_extent_ratio, 0.0, 1.0,
+          "extent of the cloud over the organ's, at least");
+  visitor("plausibility/max_extent_ratio", p.max_extent_ratio, 1.0, 100.0,
+          "extent of the cloud over the organ's, at most");
+  visitor("plausibility/inlier_tolerance", p.inlier_tolerance, 0.0, 0.1,
+          "cloud points nearer to the moved surface than this are inliers [m]");
+  visitor("plausibility/max_residual", p.max_residual, 0.0, 1.0,
+          "rms distance of the cloud to the moved surface over the organ's extent, at most");
+  visitor("plausibility/max_displacement", p.max_displacement, 0.0, 2.0,
+          "largest non-rigid displacement over the organ's extent, at most");
+  visitor("plausibility/max_jump_translation", p.max_jump_translation, 0.0, 10.0,
+          "translation from the last accepted pose at the organ's centroid, at most [m]");
+  visitor("plausibility/max_jump_rotation", p.max_jump_rotation, 0.0, 180.0,
+          "rotation from the last accepted pose, at most [degree]");
+}
+
+/// Throws std::invalid_argument naming the first setting outside its range, its value and the range.
+void validate(const RegistrationSettings& settings);
+
+/// Settings as a flat JSON object of the names above (plus stages, pairing); what result files carry.
+std::string toJson(const RegistrationSettings& settings);
+
+/// SHA-256 (hex) of toJson.
+std::string sha256(const RegistrationSettings& settings);
+
+}  // namespace unirit
