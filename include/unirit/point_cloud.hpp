@@ -25,7 +25,8 @@ struct Surface {
 /// Mean of the points; sums in double precision. Throws std::invalid_argument on an empty cloud.
 Eigen::Vector3f centroid(const Points& points);
 
-/// Twice the largest absolute coordinate about the centroid [m]: the length every limit scales with.
+/// Twice the largest absolute coordinate about the centroid [m]: the length every limit scales
+/// with.
 double extent(const Points& points);
 
 }  // namespace unirit

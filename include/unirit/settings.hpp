@@ -30,15 +30,15 @@ struct NetworkSettings {
 /// Limits outside of which a registration is refused. Lengths relative to the organ's extent hold
 /// for organs of any size.
 struct PlausibilitySettings {
-  int min_points = 50;                  ///< points in either cloud, after invalid ones are dropped
-  double min_thickness = 0.005;         ///< second and third principal deviation over the first
-  double min_extent_ratio = 0.1;        ///< extent of the intra-operative cloud over the organ's
-  double max_extent_ratio = 3.0;        ///< same, from above
-  double inlier_tolerance = 0.005;      ///< cloud points nearer than this are inliers [m]
-  double max_residual = 0.06;           ///< rms distance of cloud to moved surface, over extent
-  double max_displacement = 0.35;       ///< largest non-rigid displacement, over extent
-  double max_jump_translation = 0.10;   ///< from the last accepted pose, at the organ's centroid [m]
-  double max_jump_rotation = 60.0;      ///< from the last accepted pose [degree]
+  int min_points = 50;                 ///< points in either cloud, after invalid ones are dropped
+  double min_thickness = 0.005;        ///< second and third principal deviation over the first
+  double min_extent_ratio = 0.1;       ///< extent of the intra-operative cloud over the organ's
+  double max_extent_ratio = 3.0;       ///< same, from above
+  double inlier_tolerance = 0.005;     ///< cloud points nearer than this are inliers [m]
+  double max_residual = 0.06;          ///< rms distance of cloud to moved surface, over extent
+  double max_displacement = 0.35;      ///< largest non-rigid displacement, over extent
+  double max_jump_translation = 0.10;  ///< from the last accepted pose, at the organ's centroid [m]
+  double max_jump_rotation = 60.0;     ///< from the last accepted pose [degree]
 };
 
 /// Everything the core can be told.
@@ -86,10 +86,12 @@ void visitSettings(Settings& settings, Visitor&& visitor) {
           "rotation from the last accepted pose, at most [degree]");
 }
 
-/// Throws std::invalid_argument naming the first setting outside its range, its value and the range.
+/// Throws std::invalid_argument naming the first setting outside its range, its value and the
+/// range.
 void validate(const RegistrationSettings& settings);
 
-/// Settings as a flat JSON object of the names above (plus stages, pairing); what result files carry.
+/// Settings as a flat JSON object of the names above (plus stages, pairing); what result files
+/// carry.
 std::string toJson(const RegistrationSettings& settings);
 
 /// SHA-256 (hex) of toJson.

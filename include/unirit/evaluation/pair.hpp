@@ -5,7 +5,6 @@
 #include <cstdint>
 #include <optional>
 #include <string>
-#include <vector>
 
 #include "unirit/point_cloud.hpp"
 
@@ -19,19 +18,51 @@ const char* toString(Protocol protocol);
 /// Throws std::invalid_argument naming an unknown protocol.
 Protocol protocolFromString(const std::string& name);
 
+/// What is seen of a deformed organ, and from where.
+struct View {
+  enum class Target { kPaired, kPermuted, kResampled };
+  Target target = Target::kResampled;  ///< the source's own points (in order or not), or fresh ones
+  double visible_share = 1.0;          ///< of the surface, the part that faces the camera most
+  double rotation = 0.0;               ///< about a random axis, at most [degree]
+  double translation = 0.0;            ///< per axis, at most, over the half extent
+  double offset = 0.0;                 ///< further translation in a random direction [m]
+  double noise = 0.0;                  ///< standard deviation per axis [m]
+  double outlier_share = 0.0;          ///< of the target's points, scattered around the organ
+};
+
+View viewOf(Protocol protocol);
+
 /// A registration problem whose answer is known. Metres.
 struct RegistrationPair {
-  Points source;           ///< 3 x N, on the pre-operative surface, about its vertices' mean
-  Points source_normals;   ///< 3 x N, outwards
-  Points target;           ///< 3 x M, what is seen
-  Points truth;            ///< 3 x N, where each source point truly went, in the target's frame
+  Points source;          ///< 3 x N, on the pre-operative surface, about its vertices' mean
+  Points source_normals;  ///< 3 x N, outwards
+  Points target;          ///< 3 x N, what is seen
+  Points truth;           ///< 3 x N, where each source point truly went, in the target's frame
   Eigen::Isometry3d best_rigid = Eigen::Isometry3d::Identity();  ///< least squares source -> truth
   std::optional<Eigen::Vector3f> viewpoint;  ///< where the camera stood, in the target's frame
 };
 
-/// Makes a pair from an organ's surface: `points` samples of it, deformed by a thin-plate spline of
-/// 0.075 of the extent (RMS), seen as the protocol says. Deterministic for a seed.
-RegistrationPair makePair(const Surface& organ, Protocol protocol, int points, std::uint64_t seed);
+/// An organ's surface under one random thin-plate deformation of 0.075 of its extent (RMS), from
+/// which pairs are drawn. The RMS is measured over up to 1500 vertices.
+class DeformedOrgan {
+ public:
+  /// `pool`: how many points are sampled on either surface for pairs to draw from.
+  DeformedOrgan(const Surface& organ, std::uint64_t seed, Eigen::Index pool = 30000);
+
+  /// `points` source and target points under the view. Deterministic for a seed. Throws
+  /// std::invalid_argument where the visible share of the pool holds fewer points.
+  RegistrationPair pair(const View& view, Eigen::Index points, std::uint64_t seed) const;
+
+ private:
+  PointCloud source_pool_;
+  Points truth_pool_;
+  PointCloud target_pool_;
+  double half_extent_ = 0.0;  // of the undeformed vertices [m]
+};
+
+/// A pair as the protocol says: DeformedOrgan and View in one call.
+RegistrationPair makePair(const Surface& organ, Protocol protocol, Eigen::Index points,
+                          std::uint64_t seed);
 
 /// Least-squares rigid transform that takes `from` to `to`, column by column (Kabsch 1976).
 Eigen::Isometry3d bestRigidFit(const Points& from, const Points& to);

@@ -27,7 +27,8 @@ class ThinPlateSpline {
 
 /// A random deformation whose displacement over `points` has the given RMS. Draws in which more
 /// than 0.2 % of the points have a Jacobian determinant below 0.1 are drawn again. Deterministic
-/// for a seed. Throws std::invalid_argument on fewer than 4 points or a negative RMS.
+/// for a seed. Throws std::invalid_argument on fewer than 4 points, or an RMS that is negative or so
+/// large that no draw is free of folds.
 ThinPlateSpline randomDeformation(const Points& points, double rms, std::uint64_t seed);
 
 }  // namespace unirit

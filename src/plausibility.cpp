@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "unirit/plausibility.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <cmath>
+#include <sstream>
+
+#include "unirit/registration.hpp"
+
+namespace unirit {
+namespace {
+
+constexpr double kMillimetresPerMetre = 1000.0;
+constexpr double kUnitSlack = 10.0;  // organs of one scene differ by less than this factor
+constexpr double kRotationTolerance = 1e-6;
+
+/// Standard deviations along the principal axes, smallest first.
+Eigen::Vector3d principalDeviations(const Points& points) {
+  const Eigen::Matrix3Xd centred = (points.colwise() - centroid(points)).cast<double>();
+  const Eigen::Matrix3d covariance =
+      centred * centred.transpose() / static_cast<double>(points.cols());
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(covariance, Eigen::EigenvaluesOnly);
+  return solver.eigenvalues().cwiseMax(0.0).cwiseSqrt();
+}
+
+std::string sentenceOf(const Check& check) {
+  std::ostringstream sentence;
+  sentence << "refused: " << check.name << " is " << check.value << ", the limit is "
+           << check.limit;
+  return sentence.str();
+}
+
+double rotationError(const Eigen::Isometry3d& pose) {
+  const Eigen::Matrix3d rotation = pose.linear();
+  const double error = (rotation * rotation.transpose() - Eigen::Matrix3d::Identity()).norm();
+  return rotation.determinant() > 0.0 ? error : error + 2.0;
+}
+
+Check atMost(const char* name, double value, double limit) {
+  return {name, value, limit, value <= limit};  // false for NaN
+}
+
+}  // namespace
+
+std::optional<std::string> findFault(const PointCloud& cloud, const std::string& name,
+                                     const PlausibilitySettings& settings) {
+  std::ostringstream sentence;
+  if (cloud.size() == 0) return name + " is empty";
+  if (cloud.size() < settings.min_points) {
+    sentence << name << " has " << cloud.size() << " valid points, at least " << settings.min_points
+             << " are needed";
+    return sentence.str();
+  }
+  const Eigen::Vector3d deviations = principalDeviations(cloud.points);
+  const double least = settings.min_thickness * deviations[2];
+  if (deviations[2] <= 0.0) return name + " is a single point, repeated";
+  if (deviations[1] < least) return name + " is collinear: its points lie on one line";
+  if (deviations[0] < least) return name + " is planar: its points lie in one plane";
+  return std::nullopt;
+}
+
+std::optional<std::string> findMismatch(const PointCloud& preoperative,
+                                        const PointCloud& intraoperative,
+                                        const PlausibilitySettings& settings) {
+  const double organ = extent(preoperative.points);
+  const double seen = extent(intraoperative.points);
+  const double ratio = seen / organ;
+  if (ratio >= settings.min_extent_ratio && ratio <= settings.max_extent_ratio) return std::nullopt;
+  std::ostringstream sentence;
+  sentence << "the intra-operative cloud's extent of " << seen << " m is " << ratio
+           << " times the organ's " << organ << " m";
+  const double by_unit = std::abs(std::log(ratio)) - std::log(kMillimetresPerMetre);
+  if (std::abs(by_unit) < std::log(kUnitSlack)) {
+    sentence << ": is the " << (ratio > 1.0 ? "intra-operative" : "pre-operative")
+             << " cloud in millimetres instead of metres?";
+  } else {
+    sentence << ", outside [" << settings.min_extent_ratio << ", " << settings.max_extent_ratio
+             << "]";
+  }
+  return sentence.str();
+}
+
+std::vector<Check> checkOutput(const Registration& registration, double organ_extent,
+                               const PlausibilitySettings& settings) {
+  const Eigen::Isometry3d& pose = registration.T_intraoperative_preoperative;
+  const bool finite = pose.matrix().allFinite() && registration.deformation != nullptr &&
+                      registration.deformation->displacements().allFinite();
+  return {Check{"values that are not finite", finite ? 0.0 : 1.0, 0.0, finite},
+          atMost("rotation error", rotationError(pose), kRotationTolerance),
+          atMost("surface residual over extent", registration.residual.rms / organ_extent,
+                 settings.max_residual),
+          atMost("largest displacement over extent", registration.displacement.max / organ_extent,
+                 settings.max_displacement)};
+}
+
+std::vector<Check> checkJump(const Eigen::Isometry3d& pose, const Eigen::Isometry3d& accepted,
+                             const Eigen::Vector3d& organ_centroid,
+                             const PlausibilitySettings& settings) {
+  const Eigen::AngleAxisd rotation(
+      Eigen::Quaterniond(accepted.linear().transpose() * pose.linear()).normalized());
+  return {
+      atMost("jump in translation [m]", (pose * organ_centroid - accepted * organ_centroid).norm(),
+             settings.max_jump_translation),
+      atMost("jump in rotation [degree]", std::abs(rotation.angle()) * 180.0 / M_PI,
+             settings.max_jump_rotation)};
+}
+
+void applyChecks(const std::vector<Check>& checks, Registration& registration) {
+  for (const Check& check : checks) {
+    registration.checks.push_back(check);
+    if (check.passed || !registration.succeeded()) continue;
+    registration.status = Status::kRefused;
+    registration.message = sentenceOf(check);
+  }
+}
+
+}  // namespace unirit

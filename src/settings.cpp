@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "unirit/settings.hpp"
+
+#include <array>
+#include <nlohmann/json.hpp>
+#include <sstream>
+#include <stdexcept>
+
+#include "unirit/hash.hpp"
+
+namespace unirit {
+namespace {
+
+constexpr std::array<Stage, 2> kStages{Stage::kRigid, Stage::kNonRigid};
+constexpr std::array<Pairing, 3> kPairings{Pairing::kNearest, Pairing::kNone, Pairing::kRow};
+
+Stage stageFromString(const std::string& name) {
+  for (const Stage stage : kStages) {
+    if (name == toString(stage)) return stage;
+  }
+  throw std::invalid_argument("stages: unknown stage '" + name + "', known are rigid, nonrigid");
+}
+
+}  // namespace
+
+const char* toString(Pairing pairing) {
+  switch (pairing) {
+    case Pairing::kNearest:
+      return "nearest";
+    case Pairing::kNone:
+      return "none";
+    case Pairing::kRow:
+      return "row";
+  }
+  return "unknown";
+}
+
+const char* toString(Stage stage) { return stage == Stage::kRigid ? "rigid" : "nonrigid"; }
+
+std::string toString(const std::vector<Stage>& stages) {
+  std::string names;
+  for (const Stage stage : stages)
+    names += (names.empty() ? "" : ",") + std::string(toString(stage));
+  return names;
+}
+
+Pairing pairingFromString(const std::string& name) {
+  for (const Pairing pairing : kPairings) {
+    if (name == toString(pairing)) return pairing;
+  }
+  throw std::invalid_argument("pairing: unknown pairing '" + name +
+                              "', known are nearest, none, row");
+}
+
+std::vector<Stage> stagesFromString(const std::string& comma_separated) {
+  std::vector<Stage> stages;
+  std::istringstream words(comma_separated);
+  for (std::string word; std::getline(words, word, ',');) {
+    const Stage stage = stageFromString(word);
+    if (!stages.empty() && stage <= stages.back()) {
+      throw std::invalid_argument("stages: '" + comma_separated + "' is out of order or repeats");
+    }
+    stages.push_back(stage);
+  }
+  if (stages.empty()) throw std::invalid_argument("stages: none given, known are rigid, nonrigid");
+  return stages;
+}
+
+void validate(const RegistrationSettings& settings) {
+  if (settings.stages.empty()) throw std::invalid_argument("stages: none given");
+  visitSettings(
+      settings, [](const char* name, auto value, auto minimum, auto maximum, const char*) {
+        if (value >= minimum && value <= maximum) return;  // false for NaN
+        std::ostringstream sentence;
+        sentence << name << ": " << value << " is outside [" << minimum << ", " << maximum << "]";
+        throw std::invalid_argument(sentence.str());
+      });
+}
+
+std::string toJson(const RegistrationSettings& settings) {
+  nlohmann::json json;
+  json["stages"] = toString(settings.stages);
+  json["network/pairing"] = toString(settings.network.pairing);
+  visitSettings(settings,
+                [&](const char* name, auto value, auto, auto, const char*) { json[name] = value; });
+  return json.dump();
+}
+
+std::string sha256(const RegistrationSettings& settings) { return sha256Hex(toJson(settings)); }
+
+}  // namespace unirit
