@@ -23,7 +23,7 @@ Eigen::Vector3d principalDeviations(const Points& points) {
   return solver.eigenvalues().cwiseMax(0.0).cwiseSqrt();
 }
 
-std::string sentenceOf(const Check& check) {
+std::string sentenceOf(const PlausibilityCheck& check) {
   std::ostringstream sentence;
   sentence << "refused: " << check.name << " is " << check.value << ", the limit is "
            << check.limit;
@@ -36,7 +36,7 @@ double rotationError(const Eigen::Isometry3d& pose) {
   return rotation.determinant() > 0.0 ? error : error + 2.0;
 }
 
-Check atMost(const char* name, double value, double limit) {
+PlausibilityCheck atMost(const char* name, double value, double limit) {
   return {name, value, limit, value <= limit};  // false for NaN
 }
 
@@ -80,12 +80,12 @@ std::optional<std::string> findMismatch(const PointCloud& preoperative,
   return sentence.str();
 }
 
-std::vector<Check> checkOutput(const Registration& registration, double organ_extent,
-                               const PlausibilitySettings& settings) {
+std::vector<PlausibilityCheck> checkOutput(const Registration& registration, double organ_extent,
+                                           const PlausibilitySettings& settings) {
   const Eigen::Isometry3d& pose = registration.T_intraoperative_preoperative;
   const bool finite = pose.matrix().allFinite() && registration.deformation != nullptr &&
                       registration.deformation->displacements().allFinite();
-  return {Check{"values that are not finite", finite ? 0.0 : 1.0, 0.0, finite},
+  return {PlausibilityCheck{"values that are not finite", finite ? 0.0 : 1.0, 0.0, finite},
           atMost("rotation error", rotationError(pose), kRotationTolerance),
           atMost("surface residual over extent", registration.residual.rms / organ_extent,
                  settings.max_residual),
@@ -93,9 +93,10 @@ std::vector<Check> checkOutput(const Registration& registration, double organ_ex
                  settings.max_displacement)};
 }
 
-std::vector<Check> checkJump(const Eigen::Isometry3d& pose, const Eigen::Isometry3d& accepted,
-                             const Eigen::Vector3d& organ_centroid,
-                             const PlausibilitySettings& settings) {
+std::vector<PlausibilityCheck> checkJump(const Eigen::Isometry3d& pose,
+                                         const Eigen::Isometry3d& accepted,
+                                         const Eigen::Vector3d& organ_centroid,
+                                         const PlausibilitySettings& settings) {
   const Eigen::AngleAxisd rotation(
       Eigen::Quaterniond(accepted.linear().transpose() * pose.linear()).normalized());
   return {
@@ -105,8 +106,8 @@ std::vector<Check> checkJump(const Eigen::Isometry3d& pose, const Eigen::Isometr
              settings.max_jump_rotation)};
 }
 
-void applyChecks(const std::vector<Check>& checks, Registration& registration) {
-  for (const Check& check : checks) {
+void applyChecks(const std::vector<PlausibilityCheck>& checks, Registration& registration) {
+  for (const PlausibilityCheck& check : checks) {
     registration.checks.push_back(check);
     if (check.passed || !registration.succeeded()) continue;
     registration.status = Status::kRefused;

@@ -27,16 +27,17 @@ std::optional<std::string> findMismatch(const PointCloud& preoperative,
                                         const PlausibilitySettings& settings);
 
 /// Checks of a finished registration: finite, rotation valid, residual, displacement.
-std::vector<Check> checkOutput(const Registration& registration, double organ_extent,
-                               const PlausibilitySettings& settings);
+std::vector<PlausibilityCheck> checkOutput(const Registration& registration, double organ_extent,
+                                           const PlausibilitySettings& settings);
 
 /// Checks of the new pose against the last accepted one, measured at the organ's centroid.
-std::vector<Check> checkJump(const Eigen::Isometry3d& pose, const Eigen::Isometry3d& accepted,
-                             const Eigen::Vector3d& organ_centroid,
-                             const PlausibilitySettings& settings);
+std::vector<PlausibilityCheck> checkJump(const Eigen::Isometry3d& pose,
+                                         const Eigen::Isometry3d& accepted,
+                                         const Eigen::Vector3d& organ_centroid,
+                                         const PlausibilitySettings& settings);
 
 /// Appends the checks; the first failed one turns a succeeded registration into a refused one and
 /// writes the sentence.
-void applyChecks(const std::vector<Check>& checks, Registration& registration);
+void applyChecks(const std::vector<PlausibilityCheck>& checks, Registration& registration);
 
 }  // namespace unirit

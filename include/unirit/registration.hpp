@@ -29,7 +29,7 @@ struct Registration {
   std::shared_ptr<const Deformation> deformation;  ///< null unless succeeded or refused
   SurfaceResidual residual;                        ///< moved surface against the cloud
   DisplacementStatistics displacement;             ///< non-rigid part over the organ
-  std::vector<Check> checks;
+  std::vector<PlausibilityCheck> checks;
   std::vector<StageTime> stages;
 
   bool succeeded() const { return status == Status::kSucceeded; }

@@ -19,8 +19,8 @@ enum class Status : std::uint8_t {
 /// "SUCCEEDED", "REFUSED", ...: the constants' names in RegistrationResult.msg.
 const char* toString(Status status);
 
-/// One plausibility check: what was measured, against which limit.
-struct Check {
+/// One plausibility check: what was measured, against which limit. (unirit::Check is the message.)
+struct PlausibilityCheck {
   std::string name;
   double value = 0.0;
   double limit = 0.0;
