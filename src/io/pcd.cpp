@@ -40,14 +40,14 @@ ScalarType scalarType(std::string_view kind, long long size) {
   if (power >= 0 && kind == "I") return kSigned[power];
   if (power >= 0 && kind == "U") return kUnsigned[power];
   if (power >= 2 && kind == "F") return power == 2 ? ScalarType::kFloat32 : ScalarType::kFloat64;
-  throw std::runtime_error("its header has a field of unknown type " + std::string(kind) +
+  throw std::runtime_error("its header has a field of unknown type " + quoted(kind) + " and size " +
                            std::to_string(size));
 }
 
 std::size_t toCount(std::string_view word) {
   const long long count = toInteger(word);
   if (count < 0 || count > std::numeric_limits<std::uint32_t>::max()) {
-    throw std::runtime_error("its header has the impossible count " + std::string(word));
+    throw std::runtime_error("its header has the impossible count " + quoted(word));
   }
   return static_cast<std::size_t>(count);
 }
@@ -170,7 +170,7 @@ RawSurface parsePcd(std::string_view file) {
   } else if (header.data == "binary_compressed") {
     readPoints(header, {decompress(file, header), kHostEncoding}, surface);
   } else {
-    throw std::runtime_error("its DATA \"" + header.data + "\" is unknown");
+    throw std::runtime_error("its DATA " + quoted(header.data) + " is unknown");
   }
   return surface;
 }

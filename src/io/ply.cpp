@@ -37,7 +37,7 @@ ScalarType scalarType(std::string_view name) {
       {"double", ScalarType::kFloat64}, {"float64", ScalarType::kFloat64}};
   const auto found = types.find(name);
   if (found == types.end()) {
-    throw std::runtime_error("its header has the unknown type \"" + std::string(name) + "\"");
+    throw std::runtime_error("its header has the unknown type " + quoted(name));
   }
   return found->second;
 }
@@ -46,14 +46,15 @@ Encoding encodingFromName(std::string_view name) {
   if (name == "ascii") return Encoding::kText;
   if (name == "binary_little_endian") return Encoding::kLittleEndian;
   if (name == "binary_big_endian") return Encoding::kBigEndian;
-  throw std::runtime_error("its format \"" + std::string(name) + "\" is unknown");
+  throw std::runtime_error("its format " + quoted(name) + " is unknown");
 }
 
 Element elementFromLine(std::string_view line) {
   Element element;
   element.name = takeWord(line);
   const long long count = toInteger(takeWord(line));
-  if (count < 0) throw std::runtime_error("its header has a negative count of " + element.name);
+  if (count < 0)
+    throw std::runtime_error("its header has a negative count of " + quoted(element.name));
   element.count = static_cast<std::size_t>(count);
   return element;
 }
@@ -127,7 +128,7 @@ void readElement(const Element& element, ScalarStream& stream, RawSurface& surfa
   if (element.name == "tristrips") throw std::runtime_error("triangle strips are not supported");
   if (element.count > stream.remaining()) {
     throw std::runtime_error("its header promises " + std::to_string(element.count) + " of " +
-                             element.name + ", more than the file can hold");
+                             quoted(element.name) + ", more than the file can hold");
   }
   std::optional<VertexColumns> columns;
   if (element.name == "vertex") {
@@ -142,7 +143,7 @@ void readElement(const Element& element, ScalarStream& stream, RawSurface& surfa
     try {
       readItem(element, columns, stream, row, list, surface);
     } catch (const std::runtime_error& error) {
-      throw std::runtime_error("at " + element.name + " " + std::to_string(i + 1) + " of " +
+      throw std::runtime_error("at " + quoted(element.name) + " " + std::to_string(i + 1) + " of " +
                                std::to_string(element.count) + ", " + error.what());
     }
   }

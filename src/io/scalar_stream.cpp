@@ -7,7 +7,6 @@
 #include <cstdint>
 #include <cstring>
 #include <stdexcept>
-#include <string>
 
 namespace unirit {
 namespace {
@@ -20,7 +19,8 @@ Number parse(std::string_view word, const char* kind) {
   Number value{};
   const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
   if (error != std::errc() || end != digits.data() + digits.size()) {
-    throw std::runtime_error("\"" + std::string(word.substr(0, 40)) + "\" is not " + kind);
+    throw std::runtime_error(word.empty() ? std::string(kind) + " is missing"
+                                          : quoted(word) + " is not " + kind);
   }
   return value;
 }
@@ -90,6 +90,13 @@ std::string_view takeWord(std::string_view& text) {
   const std::string_view word = text.substr(0, text.find_first_of(kSpace));
   text.remove_prefix(word.size());
   return word;
+}
+
+std::string quoted(std::string_view word) {
+  std::string text(word.substr(0, 40));
+  std::replace_if(
+      text.begin(), text.end(), [](char c) { return c < ' ' || c > '~'; }, '?');
+  return '"' + text + '"';
 }
 
 double toNumber(std::string_view word) { return parse<double>(word, "a number"); }

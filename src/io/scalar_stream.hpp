@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <string>
 #include <string_view>
 
 namespace unirit {
@@ -33,6 +34,9 @@ std::string_view takeLine(std::string_view& text);
 
 /// Takes the first word off `text`, skipping white space before it. At the end the word is empty.
 std::string_view takeWord(std::string_view& text);
+
+/// The word in quotation marks, short and printable, for a message.
+std::string quoted(std::string_view word);
 
 /// A number such as "-1.5e3", "+2" or "nan". Throws std::runtime_error naming what is none.
 double toNumber(std::string_view word);
