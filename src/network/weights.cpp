@@ -136,21 +136,6 @@ Weights parseWeights(const std::string& bytes) {
   return weights;
 }
 
-const Layer& requireLayer(const Weights& weights, const LayerShape& shape) {
-  const auto found = weights.layers.find(shape.name);
-  if (found == weights.layers.end()) {
-    throw std::invalid_argument("weights: layer \"" + shape.name + "\" is missing");
-  }
-  const Layer& layer = found->second;
-  if (layer.weight.rows() != shape.outputs || layer.weight.cols() != shape.inputs ||
-      layer.bias.size() != shape.outputs) {
-    throw std::invalid_argument("weights: layer \"" + shape.name + "\" is not " +
-                                std::to_string(shape.outputs) + " x " +
-                                std::to_string(shape.inputs));
-  }
-  return layer;
-}
-
 /// Row-major halves of a matrix or vector, as bytes.
 template <class Matrix>
 std::string toHalfBytes(const Matrix& matrix, const std::string& name) {
@@ -185,6 +170,30 @@ void writeAtomically(const std::string& bytes, const std::string& path) {
 
 }  // namespace
 
+void validate(const Weights& weights) {
+  const auto shapes = layerShapes(weights.pairing);
+  for (const LayerShape& shape : shapes) {
+    const auto found = weights.layers.find(shape.name);
+    if (found == weights.layers.end()) {
+      throw std::invalid_argument("weights: layer \"" + shape.name + "\" is missing");
+    }
+    const Layer& layer = found->second;
+    if (layer.weight.rows() != shape.outputs || layer.weight.cols() != shape.inputs ||
+        layer.bias.size() != shape.outputs) {
+      throw std::invalid_argument("weights: layer \"" + shape.name + "\" is not " +
+                                  std::to_string(shape.outputs) + " x " +
+                                  std::to_string(shape.inputs));
+    }
+    if (!layer.weight.allFinite() || !layer.bias.allFinite()) {
+      throw std::invalid_argument("weights: layer \"" + shape.name +
+                                  "\" holds a value that is not finite");
+    }
+  }
+  if (weights.layers.size() != shapes.size()) {
+    throw std::invalid_argument("weights: there are layers the network does not know");
+  }
+}
+
 Weights readWeights(const std::string& path) {
   try {
     return parseWeights(readBytes(path));
@@ -194,14 +203,14 @@ Weights readWeights(const std::string& path) {
 }
 
 void writeWeights(const Weights& weights, const std::string& path) {
+  validate(weights);
   std::map<std::string, std::string> bytes;
   TensorFile file;
   file.metadata = weights.metadata;
   file.metadata["architecture"] = kArchitecture;
   file.metadata["pairing"] = toString(weights.pairing);
-  const auto shapes = layerShapes(weights.pairing);
-  for (const LayerShape& shape : shapes) {
-    const Layer& layer = requireLayer(weights, shape);
+  for (const LayerShape& shape : layerShapes(weights.pairing)) {
+    const Layer& layer = weights.layers.at(shape.name);
     const auto outputs = static_cast<std::uint64_t>(shape.outputs);
     const auto add = [&](const std::string& name, std::vector<std::uint64_t> size,
                          const auto& values) {
@@ -210,9 +219,6 @@ void writeWeights(const Weights& weights, const std::string& path) {
     };
     add(shape.name + ".weight", {outputs, static_cast<std::uint64_t>(shape.inputs)}, layer.weight);
     add(shape.name + ".bias", {outputs}, layer.bias);
-  }
-  if (weights.layers.size() != shapes.size()) {
-    throw std::invalid_argument("weights: there are layers the network does not know");
   }
   writeAtomically(formatSafetensors(file), path);
 }

@@ -3,6 +3,7 @@
 
 #include <Eigen/Geometry>
 #include <memory>
+#include <vector>
 
 #include "unirit/network/weights.hpp"
 #include "unirit/point_cloud.hpp"
@@ -32,6 +33,8 @@ class Network {
   Network& operator=(Network&&) noexcept;
 
   /// Rigid module: the transform that takes `source` to `target` (3 x N and 3 x M, N and M free).
+  /// Throws std::invalid_argument where a cloud is empty or not finite, std::runtime_error where
+  /// the module's output is no rotation.
   /// `iterates`, if given, gets the accumulated transform after each iteration (for tests).
   Eigen::Isometry3f estimateRigid(const Points& source, const Points& target,
                                   std::vector<Eigen::Isometry3f>* iterates = nullptr);
@@ -39,6 +42,10 @@ class Network {
   /// Non-rigid module: displacement of each of `queries` (3 x Q) given the rigidly moved `source`
   /// and `target`. With pairing row, queries must be the source and of the target's size.
   Points estimateDisplacements(const Points& source, const Points& target, const Points& queries);
+
+  /// The same into `displacements`, which is resized: no memory is allocated where its size fits.
+  void estimateDisplacements(const Points& source, const Points& target, const Points& queries,
+                             Points& displacements);
 
   /// Global features of the last call, 2 x 1024 (source, target), for the golden-state test.
   const Eigen::VectorXf& rigidFeatures() const;

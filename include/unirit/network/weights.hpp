@@ -19,10 +19,14 @@ struct Layer {
 /// The trained network as it stands in a file.
 struct Weights {
   Pairing pairing = Pairing::kNearest;
-  std::map<std::string, Layer> layers;           ///< by the names of layerShapes
-  std::map<std::string, std::string> metadata;   ///< architecture, training data, metrics, ...
-  std::string sha256;                            ///< of the file's bytes
+  std::map<std::string, Layer> layers;          ///< by the names of layerShapes
+  std::map<std::string, std::string> metadata;  ///< architecture, training data, metrics, ...
+  std::string sha256;                           ///< of the file's bytes
 };
+
+/// Throws std::invalid_argument where a layer of the architecture is missing, misshapen or holds a
+/// value that is not finite, or where there is a layer too many.
+void validate(const Weights& weights);
 
 /// Reads a safetensors file (F16 or F32) of this architecture. Throws std::runtime_error with a
 /// sentence that names the file and what is wrong with it: missing, truncated, not safetensors, a
@@ -30,8 +34,8 @@ struct Weights {
 Weights readWeights(const std::string& path);
 
 /// Writes half precision safetensors, atomically (a file of that name is never half written).
-/// Throws std::runtime_error where the file cannot be written, std::invalid_argument where a layer
-/// is missing, misshapen or does not fit in half precision.
+/// Throws std::runtime_error where the file cannot be written, std::invalid_argument as validate
+/// does and where a value does not fit in half precision.
 void writeWeights(const Weights& weights, const std::string& path);
 
 /// He-initialised weights (Kaiming normal, zero biases), last layers scaled by 0.05, the rigid

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "encoder.hpp"
+
+#include <algorithm>
+
+namespace unirit {
+namespace {
+
+constexpr int kLastLayer = static_cast<int>(kEncoderWidths.size()) - 2;
+
+}  // namespace
+
+Encoder::Encoder(const Kernels& kernels, const Weights& weights, const std::string& name)
+    : layers_(packLayers(kernels, weights, name, 0, kLastLayer - 1, Activation::kRelu)),
+      last_(kernels, weights.layers.at(name + "." + std::to_string(kLastLayer)),
+            Activation::kRelu) {}
+
+void Encoder::encode(const Points& points, float* feature, Workspace& workspace) const {
+  for (Scratch& scratch : workspace.scratches()) {
+    std::fill_n(scratch.maxima.data(), kFeatureSize, 0.0F);
+  }
+  const Kernels& kernels = workspace.kernels();
+  workspace.forEachBlock(points.cols(), [&](Scratch& scratch, long begin, long count) {
+    const RowsView input{points.data() + 3 * begin, 3, count};
+    kernels.denseMaximum(last_.view(), runLayers(kernels, layers_, input, scratch),
+                         scratch.maxima.data());
+  });
+  std::fill_n(feature, kFeatureSize, 0.0F);
+  for (const Scratch& scratch : workspace.scratches()) {
+    std::transform(feature, feature + kFeatureSize, scratch.maxima.data(), feature,
+                   [](float a, float b) { return std::max(a, b); });
+  }
+}
+
+}  // namespace unirit

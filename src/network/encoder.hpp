@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "dense_layer.hpp"
+#include "unirit/point_cloud.hpp"
+
+namespace unirit {
+
+/// Point encoder: a stack of layers for each point, then the maximum over the points.
+class Encoder {
+ public:
+  Encoder(const Kernels& kernels, const Weights& weights, const std::string& name);
+
+  /// Writes the kFeatureSize numbers of the cloud's feature. The last layer's outputs are never
+  /// stored: each block of points only raises the maxima, which a ReLU starts at zero.
+  void encode(const Points& points, float* feature, Workspace& workspace) const;
+
+ private:
+  std::vector<DenseLayer> layers_;  ///< all but the last
+  DenseLayer last_;
+};
+
+}  // namespace unirit

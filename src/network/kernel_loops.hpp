@@ -1,0 +1,156 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// The kernels' one source, included by one translation unit for each instruction set. Nothing of
+// the standard library or Eigen may be used here: the linker would merge one instruction set's copy
+// of an inline function into the code of the others.
+#pragma once
+
+#include "kernels.hpp"
+
+namespace unirit {
+namespace {
+
+/// `Lanes` floats to a register; register tiles of `TileRows` rows by `Vectors` registers.
+template <int Lanes, int TileRows, int Vectors>
+struct Loops {
+  typedef float Vector __attribute__((vector_size(Lanes * 4)));
+  typedef int IndexVector __attribute__((vector_size(Lanes * 4)));
+  static constexpr int kWidth = Lanes * Vectors;
+
+  static Vector load(const float* from) {
+    Vector vector;
+    __builtin_memcpy(&vector, from, sizeof(vector));
+    return vector;
+  }
+
+  static void store(const Vector& vector, float* to) {
+    __builtin_memcpy(to, &vector, sizeof(vector));
+  }
+
+  template <int Rows>
+  static inline __attribute__((always_inline)) void accumulate(const float* input, long stride,
+                                                               const float* panel, long inputs,
+                                                               const float* bias,
+                                                               Vector (&sums)[Rows][Vectors]) {
+#pragma GCC unroll 16
+    for (int row = 0; row < Rows; ++row) {
+#pragma GCC unroll 4
+      for (int v = 0; v < Vectors; ++v) {
+        sums[row][v] = load(bias + v * Lanes);
+      }
+    }
+    for (long k = 0; k < inputs; ++k) {
+      Vector weights[Vectors];
+#pragma GCC unroll 4
+      for (int v = 0; v < Vectors; ++v) {
+        weights[v] = load(panel + k * kWidth + v * Lanes);
+      }
+#pragma GCC unroll 16
+      for (int row = 0; row < Rows; ++row) {
+#pragma GCC unroll 4
+        for (int v = 0; v < Vectors; ++v) {
+          sums[row][v] += input[row * stride + k] * weights[v];
+        }
+      }
+    }
+  }
+
+  /// Writes the tiles of one panel for `rows` rows, in tiles of `Rows`, the rest in smaller ones.
+  template <int Rows>
+  static void densePanel(const LayerView& layer, RowsView input, long panel, float* output,
+                         long output_stride) {
+    const float* bias = layer.bias + panel * kWidth;
+    const float* weights = layer.panels + panel * kWidth * layer.inputs;
+    const Vector floor = layer.floor - Vector{};
+    for (; input.count >= Rows; input.count -= Rows) {
+      Vector sums[Rows][Vectors];
+      accumulate<Rows>(input.data, input.stride, weights, layer.inputs, bias, sums);
+#pragma GCC unroll 16
+      for (int row = 0; row < Rows; ++row) {
+#pragma GCC unroll 4
+        for (int v = 0; v < Vectors; ++v) {
+          store(sums[row][v] > floor ? sums[row][v] : floor,
+                output + row * output_stride + panel * kWidth + v * Lanes);
+        }
+      }
+      input.data += Rows * input.stride;
+      output += Rows * output_stride;
+    }
+    if constexpr (Rows > 1) {
+      densePanel<Rows / 2>(layer, input, panel, output, output_stride);
+    }
+  }
+
+  /// As densePanel, but keeps only the largest output over the rows.
+  template <int Rows>
+  static void maximumPanel(const LayerView& layer, RowsView input, long panel, float* maxima) {
+    const float* bias = layer.bias + panel * kWidth;
+    const float* weights = layer.panels + panel * kWidth * layer.inputs;
+    for (; input.count >= Rows; input.count -= Rows) {
+      Vector sums[Rows][Vectors];
+      accumulate<Rows>(input.data, input.stride, weights, layer.inputs, bias, sums);
+#pragma GCC unroll 4
+      for (int v = 0; v < Vectors; ++v) {
+        float* maximum = maxima + panel * kWidth + v * Lanes;
+        Vector largest = load(maximum);
+#pragma GCC unroll 16
+        for (int row = 0; row < Rows; ++row) {
+          largest = sums[row][v] > largest ? sums[row][v] : largest;
+        }
+        store(largest, maximum);
+      }
+      input.data += Rows * input.stride;
+    }
+    if constexpr (Rows > 1) {
+      maximumPanel<Rows / 2>(layer, input, panel, maxima);
+    }
+  }
+
+  static void dense(const LayerView& layer, const RowsView& input, long first_panel, long end_panel,
+                    float* output, long output_stride) {
+    for (long panel = first_panel; panel < end_panel; ++panel) {
+      densePanel<TileRows>(layer, input, panel, output, output_stride);
+    }
+  }
+
+  static void denseMaximum(const LayerView& layer, const RowsView& input, float* maxima) {
+    for (long panel = 0; panel < layer.panel_count; ++panel) {
+      maximumPanel<TileRows>(layer, input, panel, maxima);
+    }
+  }
+
+  /// Exhaustive, one query a lane: at a thousand targets faster than a k-d tree.
+  static void nearest(const float* queries, long query_count, const float* targets,
+                      long target_count, int* indices) {
+    for (long begin = 0; begin < query_count; begin += Lanes) {
+      const long lanes = query_count - begin < Lanes ? query_count - begin : Lanes;
+      float lane_queries[3][Lanes] = {};
+      for (long lane = 0; lane < lanes; ++lane) {
+        for (int axis = 0; axis < 3; ++axis) {
+          lane_queries[axis][lane] = queries[3 * (begin + lane) + axis];
+        }
+      }
+      const Vector x = load(lane_queries[0]);
+      const Vector y = load(lane_queries[1]);
+      const Vector z = load(lane_queries[2]);
+      Vector smallest = __builtin_inff() - Vector{};
+      IndexVector index{};
+      for (long target = 0; target < target_count; ++target) {
+        const Vector dx = x - targets[3 * target];
+        const Vector dy = y - targets[3 * target + 1];
+        const Vector dz = z - targets[3 * target + 2];
+        const Vector distance = dx * dx + dy * dy + dz * dz;
+        const IndexVector closer = distance < smallest;
+        smallest = closer ? distance : smallest;
+        index = closer ? static_cast<int>(target) - IndexVector{} : index;
+      }
+      __builtin_memcpy(indices + begin, &index, static_cast<unsigned long>(lanes) * sizeof(int));
+    }
+  }
+
+  static constexpr Kernels kernels(InstructionSet instruction_set) {
+    return {instruction_set, kWidth, dense, denseMaximum, nearest};
+  }
+};
+
+}  // namespace
+}  // namespace unirit

@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <vector>
+
+namespace unirit {
+
+/// What a kernel may use beyond the compiler's baseline. Results may differ in the last bits from
+/// one instruction set to another, but not from run to run on the same one.
+enum class InstructionSet { kBaseline, kAvx2, kAvx512 };
+
+/// A fully connected layer as the kernels read it. Outputs stand in panels of the kernels' panel
+/// width; those past the layer's own are zero.
+struct LayerView {
+  const float* panels;  ///< [panel_count][inputs][width]
+  const float* bias;    ///< [panel_count * width]
+  float floor;          ///< smallest output: 0 for a ReLU, -infinity for none
+  long inputs;
+  long panel_count;
+};
+
+/// Rows of numbers, one row a point, `stride` numbers from row to row.
+struct RowsView {
+  const float* data;
+  long stride;
+  long count;
+};
+
+/// The network's hot loops for one instruction set. An output is the bias, then one multiply-add an
+/// input in their order: it depends on its own row alone, not on its neighbours or the blocking.
+struct Kernels {
+  InstructionSet instruction_set;
+  int panel_width;  ///< outputs computed together
+
+  /// output[row][first_panel * width ...] = max(floor, weight * input[row] + bias).
+  void (*dense)(const LayerView& layer, const RowsView& input, long first_panel, long end_panel,
+                float* output, long output_stride);
+
+  /// maxima[o] = max(maxima[o], max over rows of weight * input[row] + bias).
+  void (*denseMaximum)(const LayerView& layer, const RowsView& input, float* maxima);
+
+  /// indices[q] = the first of the targets nearest to query q; both are x y z, x y z, ...
+  void (*nearest)(const float* queries, long query_count, const float* targets, long target_count,
+                  int* indices);
+};
+
+/// What this processor can run, from the baseline up.
+std::vector<InstructionSet> supportedInstructionSets();
+
+/// The kernels of the highest supported set, but none above the limit.
+const Kernels& selectKernels();
+
+/// For tests: networks built from now on use no higher set than this.
+void limitInstructionSet(InstructionSet highest);
+
+}  // namespace unirit

@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Geometry>
+#include <vector>
+
+#include "dense_layer.hpp"
+
+namespace unirit {
+
+/// A step of the rigid module: p becomes rotation * p + translation.
+struct RigidStep {
+  Eigen::Quaternionf rotation;
+  Eigen::Vector3f translation;
+};
+
+/// Reads a step off the features of the moved source and the target.
+class RigidDecoder {
+ public:
+  RigidDecoder(const Kernels& kernels, const Weights& weights);
+
+  /// `features`: 2 x kFeatureSize. Throws std::runtime_error where the quaternion cannot be
+  /// normalised.
+  RigidStep decode(const float* features, Workspace& workspace);
+
+ private:
+  std::vector<DenseLayer> layers_;
+  AlignedFloats outputs_[2];
+};
+
+}  // namespace unirit
