@@ -1,8 +1,8 @@
 # Messages, services, dynamic parameters and where catkin wants things.
 
 set(UNIRIT_CATKIN_DEPENDS
-  diagnostic_updater dynamic_reconfigure geometry_msgs nodelet pluginlib roscpp sensor_msgs std_msgs
-  std_srvs tf2_eigen tf2_msgs tf2_ros)
+  diagnostic_msgs diagnostic_updater dynamic_reconfigure geometry_msgs nodelet pluginlib roscpp
+  sensor_msgs std_msgs tf2 tf2_eigen tf2_msgs tf2_ros visualization_msgs)
 find_package(catkin REQUIRED COMPONENTS message_generation ${UNIRIT_CATKIN_DEPENDS})
 
 add_message_files(FILES Check.msg RegistrationResult.msg)

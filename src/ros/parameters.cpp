@@ -1,0 +1,162 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "parameters.hpp"
+
+#include <sstream>
+#include <stdexcept>
+#include <type_traits>
+
+#include "refusal.hpp"
+#include "result_message.hpp"
+
+namespace unirit {
+namespace {
+
+using XmlRpc::XmlRpcValue;
+
+constexpr int kPoseNumbers = 7;  // x y z qx qy qz qw
+
+template <class Value>
+constexpr XmlRpcValue::Type typeOf() {
+  if (std::is_same_v<Value, bool>) return XmlRpcValue::TypeBoolean;
+  if (std::is_same_v<Value, int>) return XmlRpcValue::TypeInt;
+  if (std::is_same_v<Value, double>) return XmlRpcValue::TypeDouble;
+  return XmlRpcValue::TypeString;
+}
+
+template <class Value>
+constexpr const char* nameOfType() {
+  if (std::is_same_v<Value, bool>) return "true or false";
+  if (std::is_same_v<Value, int>) return "a whole number";
+  if (std::is_same_v<Value, double>) return "a number";
+  return "a string";
+}
+
+/// Reads parameters one by one, keeps the default of an absent one and notes faults.
+class Reader {
+ public:
+  Reader(const ros::NodeHandle& nh, std::vector<std::string>& faults) : nh_(nh), faults_(faults) {}
+
+  template <class Value>
+  void read(const std::string& name, Value& value) {
+    XmlRpcValue given;
+    if (!nh_.getParam(name, given)) return;
+    if (std::is_same_v<Value, double> && given.getType() == XmlRpcValue::TypeInt) {
+      given = XmlRpcValue(static_cast<double>(static_cast<int>(given)));
+    }
+    if (given.getType() != typeOf<Value>()) {
+      fault(name, std::string("is not ") + nameOfType<Value>());
+      return;
+    }
+    value = static_cast<Value&>(given);
+  }
+
+  template <class Number>
+  void readNumber(const std::string& name, Number& value, Number minimum, Number maximum) {
+    Number given = value;
+    read(name, given);
+    if (given >= minimum && given <= maximum) {  // false for NaN
+      value = given;
+      return;
+    }
+    std::ostringstream range;
+    range << "is " << given << ", outside [" << minimum << ", " << maximum << "]";
+    fault(name, range.str());
+  }
+
+  /// `parse` throws std::invalid_argument on a word it does not know.
+  template <class Parse>
+  void readWord(const std::string& name, std::string word, Parse&& parse) {
+    read(name, word);
+    try {
+      parse(word);
+    } catch (const std::invalid_argument& error) {
+      fault(name, std::string("cannot be used: ") + error.what());
+    }
+  }
+
+  void readPose(const std::string& name, std::optional<Eigen::Isometry3d>& pose) {
+    std::vector<double> numbers;
+    if (!nh_.hasParam(name)) return;
+    const bool is_list = nh_.getParam(name, numbers);
+    if (is_list && numbers.empty()) return;
+    if (!is_list || numbers.size() != kPoseNumbers) {
+      fault(name, "is not a list of the 7 numbers x y z qx qy qz qw");
+      return;
+    }
+    geometry_msgs::Pose message;
+    message.position.x = numbers[0];
+    message.position.y = numbers[1];
+    message.position.z = numbers[2];
+    message.orientation.x = numbers[3];
+    message.orientation.y = numbers[4];
+    message.orientation.z = numbers[5];
+    message.orientation.w = numbers[6];
+    try {
+      pose = fromMessage(message, "it");
+    } catch (const Refusal& refusal) {
+      fault(name, std::string("cannot be used: ") + refusal.what());
+    }
+  }
+
+ private:
+  void fault(const std::string& name, const std::string& what) {
+    faults_.push_back("parameter " + nh_.resolveName(name) + " " + what);
+  }
+
+  ros::NodeHandle nh_;
+  std::vector<std::string>& faults_;
+};
+
+void readNodeSettings(Reader& reader, NodeSettings& node) {
+  reader.read("weights", node.weights);
+  reader.read("auto_register", node.auto_register);
+  reader.read("every_cloud", node.every_cloud);
+  reader.readNumber("stale_after", node.stale_after, 0.1, 3600.0);
+  reader.readPose("initial_pose", node.initial_pose);
+  reader.readWord("initial_alignment", node.initial_alignment, [&](const std::string& word) {
+    if (word != "centroid" && word != "none") {
+      throw std::invalid_argument("unknown alignment '" + word + "', known are centroid, none");
+    }
+    node.initial_alignment = word;
+  });
+  reader.read("fixed_frame", node.fixed_frame);
+  reader.read("publish_tf", node.publish_tf);
+  reader.read("invert_tf", node.invert_tf);
+  reader.readNumber("tf_rate", node.tf_rate, 0.1, 1000.0);
+  reader.readNumber("tf_timeout", node.tf_timeout, 0.0, 60.0);
+}
+
+}  // namespace
+
+Parameters readParameters(const ros::NodeHandle& private_nh) {
+  Parameters parameters;
+  Reader reader(private_nh, parameters.faults);
+  auto& registration = parameters.registration;
+  visitSettings(registration,
+                [&](const char* name, auto& value, auto minimum, auto maximum, const char*) {
+                  reader.readNumber(name, value, minimum, maximum);
+                });
+  reader.readWord("stages", toString(registration.stages),
+                  [&](const std::string& word) { registration.stages = stagesFromString(word); });
+  reader.readWord(
+      "network/pairing", toString(registration.network.pairing),
+      [&](const std::string& word) { registration.network.pairing = pairingFromString(word); });
+  readNodeSettings(reader, parameters.node);
+  return parameters;
+}
+
+PlausibilitySettings fromConfig(const UniritConfig& config) {
+  PlausibilitySettings settings;
+  settings.min_points = config.min_points;
+  settings.min_thickness = config.min_thickness;
+  settings.min_extent_ratio = config.min_extent_ratio;
+  settings.max_extent_ratio = config.max_extent_ratio;
+  settings.inlier_tolerance = config.inlier_tolerance;
+  settings.max_residual = config.max_residual;
+  settings.max_displacement = config.max_displacement;
+  settings.max_jump_translation = config.max_jump_translation;
+  settings.max_jump_rotation = config.max_jump_rotation;
+  return settings;
+}
+
+}  // namespace unirit

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <ros/node_handle.h>
+#include <unirit/UniritConfig.h>
+
+#include <Eigen/Geometry>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "unirit/settings.hpp"
+
+namespace unirit {
+
+/// What the node is told beyond the registration's own settings; config/unirit.yaml describes each.
+struct NodeSettings {
+  std::string weights;         ///< path of the weights file
+  bool auto_register = false;  ///< register every cloud; off: by the service only
+  bool every_cloud = false;    ///< each cloud in order, none dropped; off: the newest wins
+  double stale_after = 10.0;   ///< age at which an accepted registration is withdrawn [s]
+  std::optional<Eigen::Isometry3d> initial_pose;  ///< T_fixed_preoperative
+  std::string initial_alignment = "centroid";     ///< centroid or none
+  std::string fixed_frame;  ///< does not move with the camera; empty: the camera stands still
+  bool publish_tf = true;
+  bool invert_tf = false;
+  double tf_rate = 20.0;    ///< [Hz]
+  double tf_timeout = 0.5;  ///< wait for a transform at a cloud's stamp, at most [s]
+};
+
+/// Parameters as read once at start, and a sentence for each that cannot be used. A node with such
+/// faults stays alive and refuses to register: a limit that was mistyped must not fall back to a
+/// default unseen.
+struct Parameters {
+  RegistrationSettings registration;
+  NodeSettings node;
+  std::vector<std::string> faults;
+};
+
+Parameters readParameters(const ros::NodeHandle& private_nh);
+
+/// The thresholds that dynamic_reconfigure holds.
+PlausibilitySettings fromConfig(const UniritConfig& config);
+
+}  // namespace unirit
