@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <torch/torch.h>
+
+#include <condition_variable>
+#include <cstdint>
+#include <map>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "unirit/point_cloud.hpp"
+
+namespace unirit::training {
+
+/// An organ's surface and the class it is drawn by.
+struct Organ {
+  std::string name;  ///< class, "liver"
+  Surface surface;   ///< metres
+};
+
+/// Pairs in the network's unit, [B, N, 3] each.
+struct Batch {
+  torch::Tensor source;
+  torch::Tensor target;
+  torch::Tensor truth;  ///< where each source point truly went
+  torch::Tensor rigid;  ///< where the best rigid fit takes it
+  torch::Tensor scale;  ///< [B], metres per unit
+};
+
+/// What training pairs look like.
+struct BatchSettings {
+  std::int64_t pairs = 32;
+  std::int64_t points = 256;
+  std::int64_t pairs_per_deformation = 4;
+  double partial_share = 0.4;     ///< of pairs, the target being 30 to 80 % of the surface
+  double centred_share = 0.3;     ///< of pairs, the clouds' centroids brought together before
+  double rotation = 50.0;         ///< between the clouds, at most [degree]
+  double translation = 0.25;      ///< between the clouds, per axis, at most, over the half extent
+  double common_rotation = 30.0;  ///< of both clouds, at most [degree]
+  double stretch = 0.15;          ///< random scaling of each axis of the organ, at most
+};
+
+/// Batch number `index`: depends on the seed and the number alone. Classes are drawn in proportion
+/// to the square root of their organs, so that rare ones are not drowned.
+Batch makeBatch(const std::vector<Organ>& organs, const BatchSettings& settings, std::uint64_t seed,
+                std::int64_t index);
+
+/// Full-view Case B pairs of the given organs, `per_organ` each, for validation.
+Batch makeValidation(const std::vector<Organ>& organs, std::int64_t per_organ, std::int64_t points,
+                     std::uint64_t seed);
+
+/// Makes batches ahead of the trainer, in order, on its own threads.
+class BatchQueue {
+ public:
+  BatchQueue(const std::vector<Organ>& organs, const BatchSettings& settings, std::uint64_t seed,
+             std::int64_t first, int threads);
+  ~BatchQueue();
+
+  Batch next();
+
+ private:
+  void work();
+
+  const std::vector<Organ>& organs_;
+  const BatchSettings settings_;
+  const std::uint64_t seed_;
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::map<std::int64_t, Batch> ready_;
+  std::int64_t next_made_, next_taken_;
+  bool stopping_ = false;
+  std::vector<std::thread> threads_;
+};
+
+}  // namespace unirit::training

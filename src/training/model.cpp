@@ -1,0 +1,162 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "model.hpp"
+
+#include <stdexcept>
+
+#include "max_linear.hpp"
+
+namespace unirit::training {
+namespace {
+
+std::vector<int> nonRigidDecoderWidths(Pairing pairing) {
+  std::vector<int> widths{nonRigidDecoderInputs(pairing)};
+  widths.insert(widths.end(), kNonRigidDecoderHiddenWidths.begin(),
+                kNonRigidDecoderHiddenWidths.end());
+  return widths;
+}
+
+template <std::size_t Size>
+std::vector<int> toVector(const std::array<int, Size>& widths) {
+  return {widths.begin(), widths.end()};
+}
+
+/// Unit quaternions w x y z, [B, 4], to rotations, [B, 3, 3].
+torch::Tensor rotationOf(const torch::Tensor& quaternion) {
+  const auto parts = torch::nn::functional::normalize(quaternion).unbind(1);
+  const auto &w = parts[0], &x = parts[1], &y = parts[2], &z = parts[3];
+  const auto rows =
+      torch::stack({1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y),  //
+                    2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x),  //
+                    2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)},
+                   1);
+  return rows.view({-1, 3, 3});
+}
+
+}  // namespace
+
+PerceptronImpl::PerceptronImpl(const std::vector<int>& widths, bool linear_end)
+    : linear_end_(linear_end) {
+  for (std::size_t i = 0; i + 1 < widths.size(); ++i) {
+    layers_.push_back(
+        register_module(std::to_string(i), torch::nn::Linear(widths[i], widths[i + 1])));
+  }
+}
+
+torch::Tensor PerceptronImpl::forward(torch::Tensor values) {
+  return continueFrom(layers_.front()->forward(values));
+}
+
+torch::Tensor PerceptronImpl::continueFrom(torch::Tensor first_output) {
+  torch::Tensor values = std::move(first_output);
+  for (std::size_t i = 1; i < layers_.size(); ++i) {
+    values = layers_[i]->forward(torch::relu(values));
+  }
+  return linear_end_ ? values : torch::relu(values);
+}
+
+EncoderImpl::EncoderImpl() : PerceptronImpl(toVector(kEncoderWidths), false) {}
+
+torch::Tensor EncoderImpl::forward(torch::Tensor points) {
+  torch::Tensor values = std::move(points);
+  for (std::size_t i = 0; i + 1 < layers_.size(); ++i) {
+    values = torch::relu(layers_[i]->forward(values));
+  }
+  // The maximum over points commutes with the ReLU.
+  return torch::relu(maxLinear(values, layers_.back()->weight, layers_.back()->bias));
+}
+
+torch::Tensor Pose::apply(const torch::Tensor& points) const {
+  return torch::baddbmm(translation.unsqueeze(1), points, rotation.transpose(1, 2));
+}
+
+RigidModuleImpl::RigidModuleImpl()
+    : source_encoder_(register_module("source_encoder", Encoder())),
+      target_encoder_(register_module("target_encoder", Encoder())),
+      decoder_(register_module("decoder", Perceptron(toVector(kRigidDecoderWidths), true))) {}
+
+torch::Tensor RigidModuleImpl::encodeTarget(const torch::Tensor& target) {
+  return target_encoder_->forward(target);
+}
+
+Pose RigidModuleImpl::forward(const torch::Tensor& moved_source,
+                              const torch::Tensor& target_feature) {
+  const auto source_feature = source_encoder_->forward(moved_source);
+  const auto output = decoder_->forward(torch::cat({source_feature, target_feature}, 1));
+  return {rotationOf(output.slice(1, 0, 4)), output.slice(1, 4, 7)};
+}
+
+NonRigidModuleImpl::NonRigidModuleImpl(Pairing pairing)
+    : pairing_(pairing),
+      source_encoder_(register_module("source_encoder", Encoder())),
+      target_encoder_(register_module("target_encoder", Encoder())),
+      decoder_(register_module("decoder", Perceptron(nonRigidDecoderWidths(pairing), true))) {}
+
+torch::Tensor NonRigidModuleImpl::forward(const torch::Tensor& moved_source,
+                                          const torch::Tensor& target) {
+  const auto features =
+      torch::cat({source_encoder_->forward(moved_source), target_encoder_->forward(target)}, 1);
+  std::vector<torch::Tensor> local{moved_source};
+  if (pairing_ == Pairing::kRow) local.push_back(target);
+  if (pairing_ == Pairing::kNearest) {
+    const auto index = nearest(moved_source, target).second;
+    local.push_back(target.gather(1, index.unsqueeze(2).expand({-1, -1, 3})) - moved_source);
+  }
+
+  // The first layer is linear: its global columns are multiplied once a pair, not once a point.
+  const auto first = decoder_->layer(0);
+  const auto columns = first->weight.split_with_sizes(
+      {3, 2 * kFeatureSize, first->weight.size(1) - 3 - 2 * kFeatureSize}, 1);
+  const auto global = torch::linear(features, columns[1], first->bias);
+  const auto point = torch::linear(torch::cat(local, 2), torch::cat({columns[0], columns[2]}, 1));
+  return decoder_->continueFrom(point + global.unsqueeze(1));
+}
+
+UniritImpl::UniritImpl(Pairing pairing)
+    : rigid(register_module("rigid", RigidModule())),
+      nonrigid(register_module("nonrigid", NonRigidModule(pairing))),
+      pairing_(pairing) {}
+
+void UniritImpl::setWeights(const Weights& weights) {
+  const torch::NoGradGuard no_grad;
+  auto parameters = named_parameters();
+  for (const LayerShape& shape : layerShapes(pairing_)) {
+    const auto layer = weights.layers.find(shape.name);
+    if (layer == weights.layers.end()) {
+      throw std::invalid_argument("weights: layer " + shape.name + " is missing");
+    }
+    using RowMajor = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+    RowMajor weight = layer->second.weight;
+    Eigen::VectorXf bias = layer->second.bias;
+    parameters[shape.name + ".weight"].copy_(
+        torch::from_blob(weight.data(), {shape.outputs, shape.inputs}));
+    parameters[shape.name + ".bias"].copy_(torch::from_blob(bias.data(), {shape.outputs}));
+  }
+}
+
+Weights UniritImpl::weights() const {
+  using RowMajor = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+  Weights weights;
+  weights.pairing = pairing_;
+  const auto parameters = named_parameters();
+  for (const LayerShape& shape : layerShapes(pairing_)) {
+    const auto weight = parameters[shape.name + ".weight"].detach().cpu().contiguous();
+    const auto bias = parameters[shape.name + ".bias"].detach().cpu().contiguous();
+    weights.layers[shape.name] = {
+        Eigen::Map<const RowMajor>(weight.data_ptr<float>(), shape.outputs, shape.inputs),
+        Eigen::Map<const Eigen::VectorXf>(bias.data_ptr<float>(), shape.outputs)};
+  }
+  return weights;
+}
+
+std::pair<torch::Tensor, torch::Tensor> nearest(const torch::Tensor& from,
+                                                const torch::Tensor& to) {
+  torch::Tensor index;
+  {
+    const torch::NoGradGuard no_grad;
+    index = torch::cdist(from, to).argmin(2);
+  }
+  const auto neighbour = to.gather(1, index.unsqueeze(2).expand({-1, -1, 3}));
+  return {(from - neighbour).square().sum(2), index};
+}
+
+}  // namespace unirit::training

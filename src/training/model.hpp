@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <torch/torch.h>
+
+#include <string>
+#include <vector>
+
+#include "unirit/network/weights.hpp"
+
+namespace unirit::training {
+
+/// Fully connected layers of the given widths, each followed by a ReLU but, where `linear_end`, the
+/// last. Children are named "0", "1", ...
+class PerceptronImpl : public torch::nn::Module {
+ public:
+  PerceptronImpl(const std::vector<int>& widths, bool linear_end);
+
+  /// [..., inputs] -> [..., outputs]
+  torch::Tensor forward(torch::Tensor values);
+
+  /// From the second layer on, for a first layer's output (before its ReLU) computed elsewhere.
+  torch::Tensor continueFrom(torch::Tensor first_output);
+
+  torch::nn::Linear layer(std::size_t i) const { return layers_[i]; }
+
+ protected:
+  std::vector<torch::nn::Linear> layers_;
+  bool linear_end_;
+};
+TORCH_MODULE(Perceptron);
+
+/// Shared perceptron over points, then the maximum: [B, N, 3] -> [B, 1024]. On the CPU the gradient
+/// of the last layer is taken only through the points that hold a maximum, which is exact.
+class EncoderImpl : public PerceptronImpl {
+ public:
+  EncoderImpl();
+  torch::Tensor forward(torch::Tensor points);
+};
+TORCH_MODULE(Encoder);
+
+/// Rigid transforms of a batch: p -> rotation p + translation.
+struct Pose {
+  torch::Tensor rotation;     ///< [B, 3, 3]
+  torch::Tensor translation;  ///< [B, 3]
+
+  torch::Tensor apply(const torch::Tensor& points) const;  ///< [B, N, 3] -> [B, N, 3]
+};
+
+/// One iteration of the paper's rigid module.
+class RigidModuleImpl : public torch::nn::Module {
+ public:
+  RigidModuleImpl();
+  torch::Tensor encodeTarget(const torch::Tensor& target);
+  Pose forward(const torch::Tensor& moved_source, const torch::Tensor& target_feature);
+
+ private:
+  Encoder source_encoder_, target_encoder_;
+  Perceptron decoder_;
+};
+TORCH_MODULE(RigidModule);
+
+/// The non-rigid module: displacement of every point of the rigidly moved source.
+class NonRigidModuleImpl : public torch::nn::Module {
+ public:
+  explicit NonRigidModuleImpl(Pairing pairing);
+  torch::Tensor forward(const torch::Tensor& moved_source, const torch::Tensor& target);
+
+ private:
+  Pairing pairing_;
+  Encoder source_encoder_, target_encoder_;
+  Perceptron decoder_;
+};
+TORCH_MODULE(NonRigidModule);
+
+/// The whole of UniRiT, with the layer names of the weights file.
+class UniritImpl : public torch::nn::Module {
+ public:
+  explicit UniritImpl(Pairing pairing);
+
+  RigidModule rigid;
+  NonRigidModule nonrigid;
+
+  /// Replaces every parameter; throws std::invalid_argument where a layer is missing.
+  void setWeights(const Weights& weights);
+
+  /// The parameters as a weights file holds them, without metadata.
+  Weights weights() const;
+
+ private:
+  Pairing pairing_;
+};
+TORCH_MODULE(Unirit);
+
+/// Squared distances and indices of each point's nearest neighbour in `to`: [B, N] each.
+std::pair<torch::Tensor, torch::Tensor> nearest(const torch::Tensor& from, const torch::Tensor& to);
+
+}  // namespace unirit::training

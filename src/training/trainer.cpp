@@ -1,0 +1,270 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "trainer.hpp"
+
+#include <chrono>
+#include <cmath>
+#include <fstream>
+#include <stdexcept>
+#include <thread>
+
+namespace unirit::training {
+namespace {
+
+constexpr double kFinalRate = 0.01;       // of the first learning rate
+constexpr double kGrowthShare = 0.3;      // of the steps, over which the iterations grow
+constexpr double kWarmUpSteps = 200.0;    // the learning rate rises from zero
+constexpr double kLargestGradient = 1.0;  // norm, over all parameters
+constexpr int kValidationIterations = 8;
+constexpr std::int64_t kValidationPairs = 2;  // an organ
+constexpr std::int64_t kValidationPoints = 1024;
+constexpr std::int64_t kValidationChunk = 8;
+
+/// sqrt of the mean over points, [B, N, 3] -> [B].
+torch::Tensor rootMeanSquare(const torch::Tensor& offsets) {
+  return (offsets.square().sum(2).mean(1) + 1e-12).sqrt();
+}
+
+torch::Tensor distance(Loss loss, const torch::Tensor& moved, const torch::Tensor& truth,
+                       const torch::Tensor& target) {
+  if (loss == Loss::kSupervised) return rootMeanSquare(moved - truth).mean();
+  return (nearest(moved, target).first.mean(1) + 1e-12).sqrt().mean();
+}
+
+template <class Function>
+Batch transformed(const Batch& batch, Function&& function) {
+  return {function(batch.source), function(batch.target), function(batch.truth),
+          function(batch.rigid), function(batch.scale)};
+}
+
+Batch slice(const Batch& batch, std::int64_t first, std::int64_t last) {
+  return transformed(batch, [&](const torch::Tensor& t) { return t.slice(0, first, last); });
+}
+
+/// The paper's L_total; every iteration of the rigid module learns on the detached output of the
+/// one before, so it has seen what it will be given.
+torch::Tensor totalLoss(Unirit& model, const Batch& batch, const TrainingSettings& settings,
+                        int iterations) {
+  torch::Tensor moved = batch.source;
+  torch::Tensor rigid_loss = torch::zeros({}, moved.options());
+  if (settings.alpha < 1.0) {
+    const auto target_feature = model->rigid->encodeTarget(batch.target);
+    for (int i = 0; i < iterations; ++i) {
+      moved = model->rigid->forward(moved.detach(), target_feature).apply(moved.detach());
+      rigid_loss = rigid_loss + distance(settings.loss, moved, batch.rigid, batch.target);
+    }
+    rigid_loss = rigid_loss / iterations;
+  }
+  if (settings.alpha == 0.0) return rigid_loss;
+  moved = moved.detach();
+  const auto deformed = moved + model->nonrigid->forward(moved, batch.target);
+  const auto global_loss = distance(settings.loss, deformed, batch.truth, batch.target);
+  return settings.alpha * global_loss + (1.0 - settings.alpha) * rigid_loss;
+}
+
+/// Sets the gradients of a step and returns its loss. On the CPU the batch is split over threads
+/// that each run forward and backward alone: small layers gain more from that than from threads
+/// inside every operation.
+double accumulateGradients(Unirit& model, const Batch& batch, const TrainingSettings& settings,
+                           int iterations) {
+  const auto parameters = model->parameters();
+  const std::int64_t pairs = batch.source.size(0);
+  const std::int64_t parts = std::min<std::int64_t>(settings.threads, pairs);
+  std::vector<double> losses(static_cast<std::size_t>(parts));
+  std::vector<torch::autograd::variable_list> gradients(static_cast<std::size_t>(parts));
+  const auto work = [&](std::int64_t part) {
+    const std::int64_t first = part * pairs / parts, last = (part + 1) * pairs / parts;
+    const double share = static_cast<double>(last - first) / static_cast<double>(pairs);
+    const auto loss = share * totalLoss(model, slice(batch, first, last), settings, iterations);
+    const auto slot = static_cast<std::size_t>(part);
+    losses[slot] = loss.item<double>();
+    gradients[slot] = torch::autograd::grad({loss}, parameters, {}, {}, false, true);
+  };
+  std::vector<std::thread> threads;
+  for (std::int64_t part = 1; part < parts; ++part) threads.emplace_back(work, part);
+  work(0);
+  for (std::thread& thread : threads) thread.join();
+
+  double loss = 0.0;
+  for (std::size_t part = 0; part < gradients.size(); ++part) {
+    loss += losses[part];
+    for (std::size_t i = 0; i < parameters.size(); ++i) {
+      auto& gradient = gradients[part][i];
+      if (!gradient.defined()) continue;  // a module that does not train in this step
+      if (part == 0) {
+        parameters[i].mutable_grad() = gradient;
+      } else {
+        parameters[i].mutable_grad().add_(gradient);
+      }
+    }
+  }
+  return loss;
+}
+
+struct Errors {
+  double rigid = 0.0;
+  double final = 0.0;
+};
+
+Errors validate(Unirit& model, const Batch& all, const torch::Device& device) {
+  const torch::NoGradGuard no_grad;
+  double rigid = 0.0, final = 0.0;
+  const std::int64_t count = all.source.size(0);
+  for (std::int64_t first = 0; first < count; first += kValidationChunk) {
+    const Batch part = transformed(slice(all, first, std::min(first + kValidationChunk, count)),
+                                   [&](const torch::Tensor& t) { return t.to(device); });
+    const auto feature = model->rigid->encodeTarget(part.target);
+    torch::Tensor moved = part.source;
+    for (int i = 0; i < kValidationIterations; ++i) {
+      moved = model->rigid->forward(moved, feature).apply(moved);
+    }
+    const auto deformed = moved + model->nonrigid->forward(moved, part.target);
+    rigid += (rootMeanSquare(moved - part.rigid) * part.scale).sum().item<double>();
+    final += (rootMeanSquare(deformed - part.truth) * part.scale).sum().item<double>();
+  }
+  return {rigid / static_cast<double>(count), final / static_cast<double>(count)};
+}
+
+double learningRate(const TrainingSettings& settings, std::int64_t step) {
+  const double progress = static_cast<double>(step) / static_cast<double>(settings.steps);
+  const double cosine = kFinalRate + (1.0 - kFinalRate) * (1.0 + std::cos(M_PI * progress)) / 2.0;
+  return settings.learning_rate * cosine *
+         std::min(1.0, (static_cast<double>(step) + 1.0) / kWarmUpSteps);
+}
+
+int iterationsAt(const TrainingSettings& settings, std::int64_t step) {
+  const double growth = static_cast<double>(step) / (kGrowthShare * settings.steps);
+  return std::min(settings.iterations, 1 + static_cast<int>(growth * settings.iterations));
+}
+
+/// Network, optimiser and progress in one file, replaced atomically.
+class Checkpoint {
+ public:
+  explicit Checkpoint(const std::filesystem::path& folder) : path_(folder / "checkpoint.pt") {}
+
+  void save(Unirit& model, torch::optim::Adam& optimiser, std::int64_t step, double seconds) const {
+    torch::serialize::OutputArchive archive, network, state;
+    model->save(network);
+    optimiser.save(state);
+    archive.write("network", network);
+    archive.write("optimiser", state);
+    archive.write("step", torch::tensor(step));
+    archive.write("seconds", torch::tensor(seconds, torch::kFloat64));
+    const std::filesystem::path fresh = path_.string() + ".new";
+    archive.save_to(fresh.string());
+    std::filesystem::rename(fresh, path_);
+  }
+
+  /// False where there is none.
+  bool load(Unirit& model, torch::optim::Adam& optimiser, std::int64_t& step,
+            double& seconds) const {
+    if (!std::filesystem::exists(path_)) return false;
+    try {
+      torch::serialize::InputArchive archive, network, state;
+      torch::Tensor saved_step, saved_seconds;
+      archive.load_from(path_.string());
+      archive.read("network", network);
+      archive.read("optimiser", state);
+      archive.read("step", saved_step);
+      archive.read("seconds", saved_seconds);
+      model->load(network);
+      optimiser.load(state);
+      step = saved_step.item<std::int64_t>();
+      seconds = saved_seconds.item<double>();
+    } catch (const c10::Error& error) {
+      throw std::runtime_error(path_.string() + ": not a checkpoint of this network (" +
+                               error.what_without_backtrace() + ")");
+    }
+    return true;
+  }
+
+ private:
+  std::filesystem::path path_;
+};
+
+class Curves {
+ public:
+  Curves(const std::filesystem::path& path, bool resumed)
+      : file_(path, resumed ? std::ios::app : std::ios::trunc) {
+    if (!file_) throw std::runtime_error(path.string() + ": cannot be written");
+    if (!resumed) {
+      file_ << "step,seconds,pairs_per_second,learning_rate,loss,validation_rigid_mm,"
+               "validation_final_mm\n";
+    }
+  }
+
+  void append(const Progress& p) {
+    file_ << p.step << ',' << p.seconds << ',' << p.pairs_per_second << ',' << p.learning_rate
+          << ',' << p.loss << ',' << 1000.0 * p.validation_rigid << ','
+          << 1000.0 * p.validation_final << std::endl;
+  }
+
+ private:
+  std::ofstream file_;
+};
+
+}  // namespace
+
+Unirit train(const std::vector<Organ>& organs, const std::vector<Organ>& validation,
+             const TrainingSettings& settings, const std::filesystem::path& folder, Unirit model,
+             const std::function<void(const Progress&)>& report) {
+  std::filesystem::create_directories(folder);
+  model->to(settings.device);
+  torch::optim::Adam optimiser(model->parameters(), settings.learning_rate);
+  const Checkpoint checkpoint(folder);
+  std::int64_t step = 0;
+  double seconds_before = 0.0;
+  const bool resumed = checkpoint.load(model, optimiser, step, seconds_before);
+  Curves curves(folder / "curves.csv", resumed);
+  const Batch held_out =
+      makeValidation(validation, kValidationPairs, kValidationPoints, settings.seed);
+  BatchQueue queue(organs, settings.batch, settings.seed, step, settings.data_threads);
+
+  using Clock = std::chrono::steady_clock;
+  const auto start = Clock::now();
+  auto since = start;
+  const auto elapsed = [](Clock::time_point from) {
+    return std::chrono::duration<double>(Clock::now() - from).count();
+  };
+  double loss_sum = 0.0;
+  std::int64_t since_step = step;
+  while (step < settings.steps) {
+    for (auto& group : optimiser.param_groups()) {
+      static_cast<torch::optim::AdamOptions&>(group.options()).lr(learningRate(settings, step));
+    }
+    const Batch batch =
+        transformed(queue.next(), [&](const torch::Tensor& t) { return t.to(settings.device); });
+    loss_sum += accumulateGradients(model, batch, settings, iterationsAt(settings, step));
+    torch::nn::utils::clip_grad_norm_(model->parameters(), kLargestGradient);
+    optimiser.step();
+    ++step;
+
+    if (step % settings.report_every == 0 || step == settings.steps) {
+      Progress progress;
+      progress.step = step;
+      progress.steps = settings.steps;
+      progress.seconds = seconds_before + elapsed(start);
+      const double per_step = elapsed(since) / static_cast<double>(step - since_step);
+      progress.seconds_left = per_step * static_cast<double>(settings.steps - step);
+      progress.pairs_per_second = static_cast<double>(settings.batch.pairs) / per_step;
+      progress.learning_rate = learningRate(settings, step - 1);
+      progress.loss = loss_sum / static_cast<double>(step - since_step);
+      const Errors errors = validate(model, held_out, settings.device);
+      progress.validation_rigid = errors.rigid;
+      progress.validation_final = errors.final;
+      curves.append(progress);
+      report(progress);
+      if (!std::isfinite(progress.loss)) {
+        throw std::runtime_error("training diverged: the loss is not finite");
+      }
+      loss_sum = 0.0;
+      since = Clock::now();
+      since_step = step;
+    }
+    if (step % settings.save_every == 0 || step == settings.steps) {
+      checkpoint.save(model, optimiser, step, seconds_before + elapsed(start));
+    }
+  }
+  return model;
+}
+
+}  // namespace unirit::training

@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "batch.hpp"
+#include "model.hpp"
+
+namespace unirit::training {
+
+enum class Loss {
+  kSupervised,  ///< RMS to the true position (rigid module: to the best rigid fit's)
+  kPaper,       ///< one-sided nearest-neighbour RMS, the paper's L_gl and L_rd
+};
+
+struct TrainingSettings {
+  BatchSettings batch;
+  Pairing pairing = Pairing::kNearest;
+  Loss loss = Loss::kSupervised;
+  double alpha = 0.5;           ///< weight of L_gl; 1 - alpha is that of L_rd (paper's L_total)
+  int iterations = 4;           ///< of the rigid module while training, grown from 1
+  double learning_rate = 1e-3;  ///< Adam's; falls to a hundredth along a cosine
+  std::int64_t steps = 20000;
+  std::int64_t report_every = 100;
+  std::int64_t save_every = 500;
+  std::uint64_t seed = 1;
+  int threads = 1;       ///< parts of a batch computed at once; 1 leaves threads to LibTorch
+  int data_threads = 1;  ///< that make pairs
+  torch::Device device = torch::kCPU;
+};
+
+/// What a line of the curves says; lengths in metres, averaged over pairs.
+struct Progress {
+  std::int64_t step = 0;
+  std::int64_t steps = 0;
+  double seconds = 0.0;       ///< since training began, over all its runs
+  double seconds_left = 0.0;  ///< at the present speed
+  double pairs_per_second = 0.0;
+  double learning_rate = 0.0;
+  double loss = 0.0;              ///< the network's unit
+  double validation_rigid = 0.0;  ///< rigid module's output to the best rigid fit, RMS [m]
+  double validation_final = 0.0;  ///< whole network's output to the truth, RMS [m]
+};
+
+/// Trains on `organs`, validates on `validation` (Case B). Saves network, optimiser and step to
+/// `folder`/checkpoint.pt and goes on from there if it exists; curves go to `folder`/curves.csv.
+/// Throws std::runtime_error where the folder cannot be written or the checkpoint does not fit.
+Unirit train(const std::vector<Organ>& organs, const std::vector<Organ>& validation,
+             const TrainingSettings& settings, const std::filesystem::path& folder, Unirit model,
+             const std::function<void(const Progress&)>& report);
+
+}  // namespace unirit::training

@@ -1,0 +1,224 @@
+// SPDX-License-Identifier: BSD-3-Clause
+// Command line of the training: organs in, weights out.
+#include <stdlib.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cstdio>
+#include <iostream>
+#include <map>
+#include <thread>
+
+#include "trainer.hpp"
+#include "unirit/io/surface_io.hpp"
+#include "unirit/simulation/phantom.hpp"
+
+namespace {
+
+using namespace unirit;            // NOLINT
+using namespace unirit::training;  // NOLINT
+
+constexpr double kMillimetre = 0.001;
+
+struct Options {
+  std::vector<std::string> data;
+  std::vector<std::string> exclude{"small_bowel"};
+  int phantoms = 0;
+  int hold_out = 12;
+  std::string output;
+  std::string start_from;
+  std::string pairing = "nearest";
+  std::string loss = "supervised";
+  std::string device = "cpu";
+  TrainingSettings training;
+};
+
+/// OpenBLAS 0.3.21 takes its slowest kernels on recent processors, four times slower, and its
+/// threads would fight with the trainer's. It reads its environment before main, so the command
+/// starts itself again with kernels and threads named.
+void configureBlas(char** arguments) {
+  if (getenv("OPENBLAS_NUM_THREADS") != nullptr) return;
+  setenv("OPENBLAS_NUM_THREADS", "1", 1);
+  const bool avx512 = __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") &&
+                      __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512dq");
+  if (avx512 || __builtin_cpu_supports("avx2")) {
+    setenv("OPENBLAS_CORETYPE", avx512 ? "SkylakeX" : "Haswell", 0);
+  }
+  execv("/proc/self/exe", arguments);  // returns only on failure; then training is merely slower
+}
+
+void addOptions(CLI::App& app, Options& options) {
+  auto& training = options.training;
+  auto& batch = training.batch;
+  app.add_option("--data", options.data, "Folder of organ surfaces, ORGAN/*.{ply,stl,obj,pcd}, mm");
+  app.add_option("--exclude", options.exclude, "Organ classes never trained on")
+      ->capture_default_str();
+  app.add_option("--phantoms", options.phantoms, "Digital phantoms of each organ to train on too")
+      ->check(CLI::Range(0, 10000));
+  app.add_option("--hold-out", options.hold_out, "Every n-th organ of a class validates")
+      ->check(CLI::Range(2, 1000000))
+      ->capture_default_str();
+  app.add_option("--output", options.output,
+                 "Folder for checkpoint.pt, curves.csv and unirit.safetensors; a checkpoint found "
+                 "there is resumed")
+      ->required();
+  app.add_option("--start-from", options.start_from, "Weights file to start from (else He)");
+  app.add_option("--pairing", options.pairing, "nearest, none or row")->capture_default_str();
+  app.add_option("--loss", options.loss, "supervised or paper")
+      ->check(CLI::IsMember({"supervised", "paper"}))
+      ->capture_default_str();
+  app.add_option("--alpha", training.alpha,
+                 "Weight of the global loss; 0 trains the rigid module "
+                 "alone, 1 the non-rigid module alone")
+      ->check(CLI::Range(0.0, 1.0))
+      ->capture_default_str();
+  app.add_option("--iterations", training.iterations, "Rigid iterations while training")
+      ->check(CLI::Range(1, 32))
+      ->capture_default_str();
+  app.add_option("--steps", training.steps)->check(CLI::PositiveNumber)->capture_default_str();
+  app.add_option("--batch", batch.pairs, "Pairs a step")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  app.add_option("--points", batch.points, "Points of each cloud")
+      ->check(CLI::Range(8, 1200))
+      ->capture_default_str();
+  app.add_option("--partial-share", batch.partial_share, "Share of pairs seen from one side")
+      ->check(CLI::Range(0.0, 1.0))
+      ->capture_default_str();
+  app.add_option("--rotation", batch.rotation, "Between the clouds, at most [degree]")
+      ->check(CLI::Range(0.0, 180.0))
+      ->capture_default_str();
+  app.add_option("--common-rotation", batch.common_rotation, "Of both clouds, at most [degree]")
+      ->check(CLI::Range(0.0, 180.0))
+      ->capture_default_str();
+  app.add_option("--learning-rate", training.learning_rate)
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  app.add_option("--report-every", training.report_every, "Steps between lines")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  app.add_option("--save-every", training.save_every, "Steps between checkpoints")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  app.add_option("--seed", training.seed)->capture_default_str();
+  training.threads = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
+  app.add_option("--threads", training.threads, "Parts of a batch computed at once")
+      ->check(CLI::Range(1, 256))
+      ->capture_default_str();
+  app.add_option("--data-threads", training.data_threads, "Threads that make pairs")
+      ->check(CLI::Range(1, 256))
+      ->capture_default_str();
+  app.add_option("--device", options.device, "cpu or cuda")
+      ->check(CLI::IsMember({"cpu", "cuda"}))
+      ->capture_default_str();
+}
+
+std::vector<Organ> readOrgans(const Options& options) {
+  namespace fs = std::filesystem;
+  std::vector<Organ> organs;
+  for (const std::string& folder : options.data) {
+    if (!fs::is_directory(folder)) throw std::runtime_error(folder + ": not a folder");
+    std::vector<fs::path> paths;
+    for (const auto& entry : fs::recursive_directory_iterator(folder)) {
+      if (entry.is_regular_file()) paths.push_back(entry.path());
+    }
+    std::sort(paths.begin(), paths.end());
+    for (const fs::path& path : paths) {
+      const std::string name = path.parent_path().filename();
+      if (std::count(options.exclude.begin(), options.exclude.end(), name) > 0) continue;
+      try {
+        Surface surface = readSurface(path, kMillimetre).surface;
+        if (surface.faces.cols() == 0) throw std::runtime_error(path.string() + ": has no faces");
+        organs.push_back({name, std::move(surface)});
+      } catch (const std::runtime_error& error) {
+        std::cerr << "left out: " << error.what() << '\n';
+      }
+    }
+  }
+  for (const std::string& organ :
+       options.phantoms > 0 ? phantomOrgans() : std::vector<std::string>{}) {
+    for (int i = 0; i < options.phantoms; ++i) {
+      organs.push_back(
+          {"phantom_" + organ, makePhantom(organ, options.training.seed * 100000ULL + i, 5000)});
+    }
+  }
+  if (organs.empty()) throw std::runtime_error("no organs: give --data FOLDER or --phantoms N");
+  return organs;
+}
+
+/// Every n-th organ of a class is held out, if the class has as many.
+std::pair<std::vector<Organ>, std::vector<Organ>> split(std::vector<Organ> organs, int every) {
+  std::map<std::string, int> seen;
+  std::vector<Organ> kept, held_out;
+  for (Organ& organ : organs) {
+    const bool validates = ++seen[organ.name] % every == 0;
+    (validates ? held_out : kept).push_back(std::move(organ));
+  }
+  if (held_out.empty()) held_out.push_back(kept.back());
+  return {std::move(kept), std::move(held_out)};
+}
+
+void printProgress(const Progress& p) {
+  std::printf(
+      "step %ld/%ld  loss %.4f  validation: rigid %.2f mm, final %.2f mm  "
+      "%.1f pairs/s  lr %.1e  %.0f s, %.0f s left\n",
+      static_cast<long>(p.step), static_cast<long>(p.steps), p.loss, 1000.0 * p.validation_rigid,
+      1000.0 * p.validation_final, p.pairs_per_second, p.learning_rate, p.seconds, p.seconds_left);
+  std::fflush(stdout);
+}
+
+void run(Options& options) {
+  TrainingSettings& training = options.training;
+  training.pairing = pairingFromString(options.pairing);
+  training.loss = options.loss == "paper" ? Loss::kPaper : Loss::kSupervised;
+  training.device = torch::Device(options.device);
+  if (training.device.is_cuda() && !torch::cuda::is_available()) {
+    throw std::runtime_error("--device cuda: this LibTorch or machine has no CUDA device");
+  }
+  if (training.device.is_cuda()) training.threads = 1;
+  if (training.threads > 1) torch::set_num_threads(1);
+  const auto [organs, validation] = split(readOrgans(options), options.hold_out);
+  std::printf("training on %zu organs, validating on %zu\n", organs.size(), validation.size());
+
+  Unirit model(training.pairing);
+  model->setWeights(options.start_from.empty()
+                        ? randomWeights(training.pairing, static_cast<unsigned>(training.seed))
+                        : readWeights(options.start_from));
+  Progress last;
+  model = train(organs, validation, training, options.output, model, [&](const Progress& progress) {
+    printProgress(progress);
+    last = progress;
+  });
+
+  Weights weights = model->weights();
+  weights.metadata["training_steps"] = std::to_string(training.steps);
+  weights.metadata["training_organs"] = std::to_string(organs.size());
+  weights.metadata["training_seed"] = std::to_string(training.seed);
+  weights.metadata["loss"] = options.loss;
+  weights.metadata["validation_rigid_mm"] = std::to_string(1000.0 * last.validation_rigid);
+  weights.metadata["validation_final_mm"] = std::to_string(1000.0 * last.validation_final);
+  const std::filesystem::path path = std::filesystem::path(options.output) / "unirit.safetensors";
+  writeWeights(weights, path);
+  std::printf("wrote %s\n", path.c_str());
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  configureBlas(argv);
+  CLI::App app{"Trains the UniRiT network and writes its weights as safetensors."};
+  Options options;
+  addOptions(app, options);
+  try {
+    app.parse(argc, argv);
+    run(options);
+  } catch (const CLI::ParseError& error) {
+    const int code = app.exit(error);
+    return code == 0 ? 0 : 2;
+  } catch (const std::exception& error) {
+    std::cerr << "unirit_train: " << error.what() << '\n';
+    return 2;
+  }
+  return 0;
+}
