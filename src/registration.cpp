@@ -96,13 +96,12 @@ Registration Registrar::Implementation::run(const PointCloud& preoperative,
   Registration registration = ended(Status::kSucceeded, "registered");
   auto& stages = registration.stages;
 
-  // Sample both clouds; the start takes the seen one to the organ's frame
+  // Bring the seen cloud to the organ's frame, sample both
   Points target;
   timed("sampling", stages, [&] {
     prepare(preoperative);
-    const Points seen = select(intraoperative.points,
-                               sampleEvenly(intraoperative.points, settings.sampling.points));
-    target = (guess.inverse() * seen.cast<double>()).cast<float>();
+    const Points seen = (guess.inverse() * intraoperative.points.cast<double>()).cast<float>();
+    target = select(seen, sampleEvenly(seen, settings.sampling.points));
     target = model->normalisation.apply(target);
   });
 

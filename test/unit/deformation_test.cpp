@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "unirit/deformation.hpp"
+
+#include <gtest/gtest.h>
+
+#include "shapes.hpp"
+
+namespace unirit {
+namespace {
+
+Eigen::Isometry3d somePose() {
+  Eigen::Isometry3d pose(Eigen::AngleAxisd(0.7, Eigen::Vector3d(1, 2, 3).normalized()));
+  pose.translation() << 0.5, -0.2, 0.1;
+  return pose;
+}
+
+TEST(Deformation, MovesSurfacePointsByTheirOwnDisplacement) {
+  const Points surface = test::bumpyEllipsoid(200, 1);
+  const Points displacements = 0.01F * Points::Random(3, 200);
+  const Deformation deformation(somePose(), surface, displacements);
+  const Points expected = (somePose().cast<float>() * surface) + displacements;
+  EXPECT_TRUE(deformation.movedSurface().isApprox(expected, 1e-6F));
+  EXPECT_TRUE(deformation.move(surface).isApprox(expected, 1e-6F));
+}
+
+TEST(Deformation, MovesInnerPointsByTheMeanOfTheirNeighbours) {
+  const Points surface = test::bumpyEllipsoid(500, 2);
+  const Points same = Eigen::Vector3f(0.01F, 0.02F, 0.03F).replicate(1, 500);
+  const Deformation deformation(Eigen::Isometry3d::Identity(), surface, same);
+  const Points inner = 0.5F * surface.leftCols(20);
+  EXPECT_TRUE(deformation.move(inner).isApprox(inner + same.leftCols(20), 1e-5F));
+}
+
+TEST(Deformation, WeighsNeighboursByInverseDistance) {
+  Points surface(3, 2), displacements = Points::Zero(3, 2);
+  surface << 0, 4, 0, 0, 0, 0;
+  displacements(2, 0) = 3.0F;
+  const Deformation deformation(Eigen::Isometry3d::Identity(), surface, displacements);
+  const Points moved = deformation.move(Eigen::Vector3f(1, 0, 0));
+  EXPECT_NEAR(moved(2, 0), 3.0F * (1.0F / 1.0F) / (1.0F / 1.0F + 1.0F / 3.0F), 1e-6F);
+}
+
+TEST(Deformation, RigidPartLeavesDisplacementsOut) {
+  const Points surface = test::bumpyEllipsoid(50, 3);
+  const Deformation deformation(somePose(), surface, Points::Ones(3, 50));
+  EXPECT_TRUE(deformation.moveRigidly(surface).isApprox(somePose().cast<float>() * surface, 1e-6F));
+}
+
+TEST(Deformation, RefusesDisplacementsOfAnotherSizeAndEmptySurfaces) {
+  const auto pose = Eigen::Isometry3d::Identity();
+  EXPECT_THROW(Deformation(pose, Points(3, 2), Points(3, 3)), std::invalid_argument);
+  EXPECT_THROW(Deformation(pose, Points(3, 0), Points(3, 0)), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace unirit

@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "unirit/metrics.hpp"
+
+#include <gtest/gtest.h>
+
+#include "shapes.hpp"
+
+namespace unirit {
+namespace {
+
+/// A flat 11 x 11 grid with 10 mm between points.
+Points grid() {
+  Points points(3, 121);
+  for (int i = 0; i < 121; ++i) {
+    points.col(i) << 0.01F * static_cast<float>(i % 11), 0.01F * static_cast<float>(i / 11), 0.0F;
+  }
+  return points;
+}
+
+TEST(RootMeanSquareDistance, EqualsTheHandComputedValue) {
+  Points a = Points::Zero(3, 2), b = Points::Zero(3, 2);
+  b(0, 0) = 3.0F;
+  b(1, 1) = 4.0F;
+  EXPECT_DOUBLE_EQ(rootMeanSquareDistance(a, b), std::sqrt(12.5));
+}
+
+TEST(RootMeanSquareDistance, RefusesCloudsOfDifferentOrNoSize) {
+  EXPECT_THROW(rootMeanSquareDistance(Points(3, 2), Points(3, 3)), std::invalid_argument);
+  EXPECT_THROW(rootMeanSquareDistance(Points(3, 0), Points(3, 0)), std::invalid_argument);
+}
+
+TEST(NearestDistances, AgreeWithAFullSearch) {
+  const Points from = test::bumpyEllipsoid(200, 1), to = test::bumpyEllipsoid(300, 2);
+  const Eigen::RowVectorXf distances = nearestDistances(from, to);
+  for (Eigen::Index i = 0; i < from.cols(); ++i) {
+    EXPECT_FLOAT_EQ(distances[i], (to.colwise() - from.col(i)).colwise().norm().minCoeff());
+  }
+  EXPECT_THROW(nearestDistances(from, Points(3, 0)), std::invalid_argument);
+}
+
+TEST(SurfaceResidual, MeasuresALiftedHalfOfAGrid) {
+  Points seen = grid().leftCols(66);  // 6 of 11 rows
+  seen.row(2).array() += 0.002F;
+  const SurfaceResidual residual = surfaceResidual(grid(), seen, 0.003);
+  EXPECT_NEAR(residual.rms, 0.002, 1e-7);
+  EXPECT_NEAR(residual.median, 0.002, 1e-7);
+  EXPECT_NEAR(residual.p95, 0.002, 1e-7);
+  EXPECT_DOUBLE_EQ(residual.inlier_fraction, 1.0);
+  EXPECT_NEAR(residual.coverage, 66.0 / 121.0, 1e-12);
+  EXPECT_DOUBLE_EQ(surfaceResidual(grid(), seen, 0.001).inlier_fraction, 0.0);
+}
+
+TEST(DisplacementStatistics, OfAUniformShiftAreItsLengthWithoutFolds) {
+  Points shift = Points::Zero(3, 121);
+  shift.row(0).setConstant(0.003F);
+  shift.row(1).setConstant(0.004F);
+  const DisplacementStatistics statistics = displacementStatistics(grid(), shift);
+  EXPECT_NEAR(statistics.rms, 0.005, 1e-7);
+  EXPECT_NEAR(statistics.p95, 0.005, 1e-7);
+  EXPECT_NEAR(statistics.max, 0.005, 1e-7);
+  EXPECT_DOUBLE_EQ(statistics.folded_fraction, 0.0);
+}
+
+TEST(DisplacementStatistics, CountsPointsWhereTheSurfaceIsTurnedInsideOut) {
+  const Points points = grid();
+  Points folding = Points::Zero(3, 121);
+  folding.row(0) = -2.0F * points.row(0);  // x -> -x: mirrored everywhere
+  EXPECT_DOUBLE_EQ(displacementStatistics(points, folding).folded_fraction, 1.0);
+  folding.row(0) = -0.5F * points.row(0);  // squeezed, not folded
+  EXPECT_DOUBLE_EQ(displacementStatistics(points, folding).folded_fraction, 0.0);
+}
+
+TEST(DisplacementStatistics, RefusesDisplacementsOfAnotherSize) {
+  EXPECT_THROW(displacementStatistics(grid(), Points(3, 5)), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace unirit

@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "unirit/evaluation/pair.hpp"
+
+#include <gtest/gtest.h>
+
+#include "shapes.hpp"
+#include "unirit/metrics.hpp"
+
+namespace unirit {
+namespace {
+
+constexpr Protocol kAll[] = {Protocol::kPaired, Protocol::kPermuted, Protocol::kResampled,
+                             Protocol::kCaseB,  Protocol::kPartial,  Protocol::kOffset,
+                             Protocol::kIntraop};
+
+/// A box cut finely enough to be deformed: every face of it split into a grid.
+Surface organ() {
+  Surface mesh = test::box({0.2F, 0.12F, 0.08F});
+  for (int round = 0; round < 3; ++round) {  // each triangle into four
+    Surface finer;
+    const Eigen::Index faces = mesh.faces.cols();
+    finer.vertices.points.resize(3, 12 * faces);
+    finer.faces.resize(3, 4 * faces);
+    for (Eigen::Index f = 0; f < faces; ++f) {
+      const Eigen::Matrix3f c =
+          select(mesh.vertices.points, {mesh.faces(0, f), mesh.faces(1, f), mesh.faces(2, f)});
+      const Eigen::Vector3f ab = (c.col(0) + c.col(1)) / 2, bc = (c.col(1) + c.col(2)) / 2,
+                            ca = (c.col(2) + c.col(0)) / 2;
+      finer.vertices.points.middleCols(12 * f, 12) << c.col(0), ab, ca, ab, c.col(1), bc, ca, bc,
+          c.col(2), ab, bc, ca;
+    }
+    for (int i = 0; i < finer.faces.size(); ++i) finer.faces.data()[i] = i;
+    mesh = finer;
+  }
+  return mesh;
+}
+
+TEST(Pair, IsTheSameForTheSameSeedAndAnotherForAnother) {
+  const Surface mesh = organ();
+  for (const Protocol protocol : kAll) {
+    const RegistrationPair a = makePair(mesh, protocol, 128, 1),
+                           b = makePair(mesh, protocol, 128, 1);
+    EXPECT_EQ(a.source, b.source);
+    EXPECT_EQ(a.target, b.target);
+    EXPECT_EQ(a.truth, b.truth);
+    EXPECT_NE(a.target, makePair(mesh, protocol, 128, 2).target) << toString(protocol);
+  }
+}
+
+TEST(Pair, DeformsByTheShareOfTheExtentThatTheProtocolsName) {
+  const Surface mesh = organ();
+  double sum = 0.0;
+  for (std::uint64_t seed = 0; seed < 20; ++seed) {
+    const RegistrationPair pair = makePair(mesh, Protocol::kResampled, 1024, seed);
+    sum += rootMeanSquareDistance(pair.source, pair.truth);
+  }
+  EXPECT_NEAR(sum / 20.0, 0.075 * extent(mesh.vertices.points), 0.001);
+}
+
+TEST(Pair, TargetsOfPairedAndPermutedAreTheTruth) {
+  const Surface mesh = organ();
+  const RegistrationPair paired = makePair(mesh, Protocol::kPaired, 200, 3);
+  EXPECT_EQ(paired.target, paired.truth);
+  const RegistrationPair permuted = makePair(mesh, Protocol::kPermuted, 200, 3);
+  EXPECT_NE(permuted.target, permuted.truth);
+  EXPECT_EQ(nearestDistances(permuted.target, permuted.truth).maxCoeff(), 0.0F);
+}
+
+TEST(Pair, ResampledTargetsLieOnTheDeformedSurfaceButAreOtherPoints) {
+  const RegistrationPair pair = makePair(organ(), Protocol::kResampled, 4000, 4);
+  const Eigen::RowVectorXf distances = nearestDistances(pair.target, pair.truth);
+  EXPECT_LT(distances.mean(), 0.004F);
+  EXPECT_GT(distances.mean(), 0.0005F);
+}
+
+TEST(Pair, PartialTargetsFaceTheCamera) {
+  const RegistrationPair pair = makePair(organ(), Protocol::kPartial, 1024, 5);
+  ASSERT_TRUE(pair.viewpoint.has_value());
+  const double near = (pair.target.colwise() - *pair.viewpoint).colwise().norm().mean();
+  const double all = (pair.truth.colwise() - *pair.viewpoint).colwise().norm().mean();
+  EXPECT_LT(near, all - 0.01);
+  EXPECT_FALSE(makePair(organ(), Protocol::kCaseB, 64, 5).viewpoint.has_value());
+}
+
+TEST(Pair, CaseBRotatesAndShiftsWithinItsBounds) {
+  const Surface mesh = organ();
+  const double half = extent(mesh.vertices.points) / 2.0;
+  double largest_angle = 0.0;
+  for (std::uint64_t seed = 0; seed < 30; ++seed) {
+    const RegistrationPair pair = makePair(mesh, Protocol::kCaseB, 256, seed);
+    const double angle = Eigen::AngleAxisd(pair.best_rigid.linear()).angle();
+    largest_angle = std::max(largest_angle, angle);
+    // The deformation itself has a rigid part of its own, hence the margins.
+    EXPECT_LT(angle, (45.0 + 15.0) * M_PI / 180.0);
+    EXPECT_LT(pair.best_rigid.translation().cwiseAbs().maxCoeff(), 0.2 * half + 0.03);
+  }
+  EXPECT_GT(largest_angle, 25.0 * M_PI / 180.0);
+}
+
+TEST(Pair, OffsetMovesTheTargetHalfAMetreAway) {
+  const RegistrationPair pair = makePair(organ(), Protocol::kOffset, 256, 6);
+  EXPECT_NEAR((centroid(pair.target) - centroid(pair.source)).norm(), 0.5F, 0.06F);
+}
+
+TEST(Pair, RefusesMorePointsThanTheViewHolds) {
+  EXPECT_THROW(makePair(organ(), Protocol::kPartial, 20000, 7), std::invalid_argument);
+}
+
+TEST(Protocols, NamesRoundTripAndUnknownOnesAreRefused) {
+  for (const Protocol protocol : kAll) EXPECT_EQ(protocolFromString(toString(protocol)), protocol);
+  EXPECT_THROW(protocolFromString("caseA"), std::invalid_argument);
+}
+
+TEST(BestRigidFit, FindsAKnownPose) {
+  const Points from = test::bumpyEllipsoid(100, 8);
+  Eigen::Isometry3d pose(Eigen::AngleAxisd(2.0, Eigen::Vector3d(3, 1, 2).normalized()));
+  pose.translation() << 1.0, 2.0, 3.0;
+  const Points to = (pose * from.cast<double>()).cast<float>();
+  EXPECT_TRUE(bestRigidFit(from, to).isApprox(pose, 1e-5));
+  EXPECT_THROW(bestRigidFit(from, Points(3, 5)), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace unirit

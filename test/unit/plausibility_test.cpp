@@ -1,0 +1,131 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "unirit/plausibility.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "shapes.hpp"
+#include "unirit/registration.hpp"
+
+namespace unirit {
+namespace {
+
+const PlausibilitySettings kDefaults;
+
+std::string faultOf(const Points& points) {
+  return findFault({points, {}}, "the cloud", kDefaults).value_or("");
+}
+
+std::string mismatchOf(double scale) {
+  const Points organ = test::bumpyEllipsoid(200, 1);
+  return findMismatch({organ, {}}, {static_cast<float>(scale) * organ, {}}, kDefaults).value_or("");
+}
+
+/// A registration that passes every check, of an organ of 0.2 m.
+Registration plausible() {
+  Registration registration;
+  registration.status = Status::kSucceeded;
+  const Points surface = test::bumpyEllipsoid(100, 2);
+  registration.deformation = std::make_shared<const Deformation>(Eigen::Isometry3d::Identity(),
+                                                                 surface, Points::Zero(3, 100));
+  return registration;
+}
+
+std::string refusalOf(Registration registration) {
+  applyChecks(checkOutput(registration, 0.2, kDefaults), registration);
+  EXPECT_EQ(registration.checks.size(), 4U);
+  return registration.succeeded() ? "" : registration.message;
+}
+
+TEST(FindFault, AcceptsAnOrgan) { EXPECT_EQ(faultOf(test::bumpyEllipsoid(200, 1)), ""); }
+
+TEST(FindFault, NamesEmptyTinyPlanarCollinearAndRepeatedClouds) {
+  const Points organ = test::bumpyEllipsoid(200, 1);
+  EXPECT_EQ(faultOf(Points(3, 0)), "the cloud is empty");
+  EXPECT_EQ(faultOf(organ.leftCols(10)), "the cloud has 10 valid points, at least 50 are needed");
+  Points planar = organ;
+  planar.row(1) = 2.0F * planar.row(0) + 0.5F * planar.row(2);
+  EXPECT_NE(faultOf(planar).find("planar"), std::string::npos);
+  Points collinear = organ;
+  collinear.bottomRows(2).setConstant(0.3F);
+  EXPECT_NE(faultOf(collinear).find("collinear"), std::string::npos);
+  EXPECT_NE(faultOf(Points::Constant(3, 100, 1.0F)).find("single point"), std::string::npos);
+}
+
+TEST(FindMismatch, TellsMillimetresFromMetres) {
+  EXPECT_EQ(mismatchOf(1.0), "");
+  EXPECT_EQ(mismatchOf(0.4), "");
+  EXPECT_NE(mismatchOf(1000.0).find("is the intra-operative cloud in millimetres"),
+            std::string::npos);
+  EXPECT_NE(mismatchOf(400.0).find("millimetres"), std::string::npos);
+  EXPECT_NE(mismatchOf(0.001).find("is the pre-operative cloud in millimetres"), std::string::npos);
+}
+
+TEST(FindMismatch, NamesOtherExtents) {
+  EXPECT_NE(mismatchOf(5.0).find("5 times the organ's"), std::string::npos);
+  EXPECT_EQ(mismatchOf(5.0).find("millimetres"), std::string::npos);
+  EXPECT_NE(mismatchOf(0.05).find("outside"), std::string::npos);
+}
+
+TEST(CheckOutput, PassesAPlausibleRegistration) { EXPECT_EQ(refusalOf(plausible()), ""); }
+
+TEST(CheckOutput, RefusesWhatIsNotFinite) {
+  Registration registration = plausible();
+  registration.T_intraoperative_preoperative.translation().x() = std::nan("");
+  EXPECT_NE(refusalOf(registration).find("not finite"), std::string::npos);
+}
+
+TEST(CheckOutput, RefusesRotationsThatAreNone) {
+  Registration registration = plausible();
+  registration.T_intraoperative_preoperative.linear() *= 1.01;
+  EXPECT_NE(refusalOf(registration).find("rotation error"), std::string::npos);
+  registration.T_intraoperative_preoperative.linear() = -Eigen::Matrix3d::Identity();
+  EXPECT_NE(refusalOf(registration).find("rotation error"), std::string::npos);
+}
+
+TEST(CheckOutput, RefusesLargeResidualsAndDisplacementsNamingValueAndLimit) {
+  Registration registration = plausible();
+  registration.residual.rms = 0.02;
+  EXPECT_EQ(refusalOf(registration),
+            "refused: surface residual over extent is 0.1, the limit is 0.06");
+  registration = plausible();
+  registration.displacement.max = 0.1;
+  EXPECT_EQ(refusalOf(registration),
+            "refused: largest displacement over extent is 0.5, the limit is 0.35");
+}
+
+TEST(CheckJump, MeasuresAtTheOrgansCentroid) {
+  const Eigen::Vector3d centre(1.0, 0.0, 0.0);
+  // A turn about the centroid shifts the frame's origin far, but not the organ.
+  const Eigen::Isometry3d turn = Eigen::Translation3d(centre) *
+                                 Eigen::AngleAxisd(0.5, Eigen::Vector3d::UnitZ()) *
+                                 Eigen::Translation3d(-centre);
+  const auto checks = checkJump(turn, Eigen::Isometry3d::Identity(), centre, kDefaults);
+  ASSERT_EQ(checks.size(), 2U);
+  EXPECT_NEAR(checks[0].value, 0.0, 1e-12);
+  EXPECT_NEAR(checks[1].value, 0.5 * 180.0 / M_PI, 1e-9);
+  EXPECT_TRUE(checks[0].passed && checks[1].passed);
+}
+
+TEST(CheckJump, RefusesFarAndTurnedPoses) {
+  const Eigen::Isometry3d far(Eigen::Translation3d(0.2, 0.0, 0.0));
+  const Eigen::Isometry3d turned(Eigen::AngleAxisd(2.0, Eigen::Vector3d::UnitX()));
+  const Eigen::Vector3d centre = Eigen::Vector3d::Zero();
+  EXPECT_FALSE(checkJump(far, Eigen::Isometry3d::Identity(), centre, kDefaults)[0].passed);
+  EXPECT_FALSE(checkJump(turned, Eigen::Isometry3d::Identity(), centre, kDefaults)[1].passed);
+}
+
+TEST(ApplyChecks, KeepsTheFirstRefusalsSentenceAndAllChecks) {
+  Registration registration = plausible();
+  applyChecks({PlausibilityCheck{"one", 1.0, 2.0, true},
+               {"two", 3.0, 2.0, false},
+               {"three", 4.0, 2.0, false}},
+              registration);
+  EXPECT_EQ(registration.status, Status::kRefused);
+  EXPECT_EQ(registration.message, "refused: two is 3, the limit is 2");
+  EXPECT_EQ(registration.checks.size(), 3U);
+}
+
+}  // namespace
+}  // namespace unirit
