@@ -1,10 +1,17 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "dense_layer.hpp"
 
+#include <algorithm>
 #include <limits>
 #include <utility>
 
 namespace unirit {
+namespace {
+
+// Waking the threads costs more than reading fewer weights than this
+constexpr long kParallelWeights = 1L << 20;
+
+}  // namespace
 
 DenseLayer::DenseLayer(const Kernels& kernels, const Layer& layer, Activation activation)
     : width_(kernels.panel_width) {
@@ -13,13 +20,14 @@ DenseLayer::DenseLayer(const Kernels& kernels, const Layer& layer, Activation ac
   const long panel_count = (outputs + width_ - 1) / width_;
   panels_ = AlignedFloats(static_cast<std::size_t>(panel_count * inputs * width_));
   bias_ = AlignedFloats(static_cast<std::size_t>(panel_count * width_));
-  for (long output = 0; output < outputs; ++output) {
-    float* panel = panels_.data() + output / width_ * inputs * width_ + output % width_;
-    for (long input = 0; input < inputs; ++input) {
-      panel[input * width_] = layer.weight(output, input);
+  for (long input = 0; input < inputs; ++input) {
+    for (long output = 0; output < outputs; ++output) {
+      const long panel = output / width_;
+      panels_.data()[(panel * inputs + input) * width_ + output % width_] =
+          layer.weight(output, input);
     }
-    bias_.data()[output] = layer.bias[output];
   }
+  std::copy(layer.bias.begin(), layer.bias.end(), bias_.data());
   const float floor =
       activation == Activation::kRelu ? 0.0F : -std::numeric_limits<float>::infinity();
   view_ = {panels_.data(), bias_.data(), floor, inputs, panel_count};
@@ -30,7 +38,8 @@ std::size_t DenseLayer::paddedOutputs() const {
 }
 
 void DenseLayer::applyToRow(const float* input, float* output, Workspace& workspace) const {
-#pragma omp parallel for num_threads(workspace.threads()) schedule(static)
+  const bool parallel = view_.panel_count * width_ * view_.inputs >= kParallelWeights;
+#pragma omp parallel for num_threads(workspace.threads()) schedule(static) if (parallel)
   for (long panel = 0; panel < view_.panel_count; ++panel) {
     workspace.kernels().dense(view_, {input, 0, 1}, panel, panel + 1, output, 0);
   }

@@ -31,6 +31,18 @@ std::vector<const Kernels*> supportedKernels() {
 
 }  // namespace
 
+const char* toString(InstructionSet instruction_set) {
+  switch (instruction_set) {
+    case InstructionSet::kAvx512:
+      return "avx512";
+    case InstructionSet::kAvx2:
+      return "avx2";
+    case InstructionSet::kBaseline:
+      break;
+  }
+  return "baseline";
+}
+
 std::vector<InstructionSet> supportedInstructionSets() {
   std::vector<InstructionSet> sets;
   for (const Kernels* kernels : supportedKernels()) {

@@ -9,6 +9,8 @@ namespace unirit {
 /// one instruction set to another, but not from run to run on the same one.
 enum class InstructionSet { kBaseline, kAvx2, kAvx512 };
 
+const char* toString(InstructionSet instruction_set);
+
 /// A fully connected layer as the kernels read it. Outputs stand in panels of the kernels' panel
 /// width; those past the layer's own are zero.
 struct LayerView {

@@ -1,0 +1,154 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <gtest/gtest.h>
+
+#include <limits>
+
+#include "network_reference.hpp"
+
+namespace unirit {
+namespace {
+
+using reference::loudWeights;
+using reference::randomPoints;
+
+/// The sentence of the exception that `work` must throw.
+template <class Exception, class Work>
+std::string sentenceOf(const Work& work) {
+  try {
+    work();
+  } catch (const Exception& exception) {
+    return exception.what();
+  }
+  ADD_FAILURE() << "nothing was thrown";
+  return "";
+}
+
+void expectMentions(const std::string& sentence, const std::string& words) {
+  EXPECT_NE(sentence.find(words), std::string::npos) << sentence;
+}
+
+TEST(NetworkContract, weightsOfAnotherPairingAreRefused) {
+  NetworkSettings settings;
+  settings.pairing = Pairing::kNone;
+  const auto sentence = sentenceOf<std::invalid_argument>(
+      [&] { Network(loudWeights(Pairing::kNearest), settings, 1); });
+  expectMentions(sentence, "pairing");
+  expectMentions(sentence, "none");
+  expectMentions(sentence, "nearest");
+}
+
+TEST(NetworkContract, unusableArgumentsOfTheConstructorAreNamed) {
+  const auto weights = loudWeights(Pairing::kNearest);
+  expectMentions(sentenceOf<std::invalid_argument>([&] { Network(nullptr, {}, 1); }), "weights");
+  expectMentions(sentenceOf<std::invalid_argument>([&] { Network(weights, {}, 0); }), "threads");
+  NetworkSettings settings;
+  settings.rigid_iterations = 0;
+  expectMentions(sentenceOf<std::invalid_argument>([&] { Network(weights, settings, 1); }),
+                 "rigid_iterations");
+  const auto damaged = std::make_shared<Weights>(*weights);
+  damaged->layers.erase("rigid.decoder.3");
+  expectMentions(sentenceOf<std::invalid_argument>([&] { Network(damaged, {}, 1); }),
+                 "rigid.decoder.3");
+}
+
+TEST(NetworkContract, cloudsThatAreEmptyOrNotFiniteAreNamed) {
+  Network network(loudWeights(Pairing::kNearest), {}, 1);
+  const Points good = randomPoints(9, 1);
+  Points bad = good;
+  bad(1, 4) = std::numeric_limits<float>::quiet_NaN();
+  const Points empty(3, 0);
+  for (const Points& cloud : {empty, bad}) {
+    const auto refuse = [&](const Points& source, const Points& target, const std::string& name) {
+      expectMentions(
+          sentenceOf<std::invalid_argument>([&] { network.estimateRigid(source, target); }), name);
+      expectMentions(sentenceOf<std::invalid_argument>(
+                         [&] { network.estimateDisplacements(source, target, good); }),
+                     name);
+    };
+    refuse(cloud, good, "source");
+    refuse(good, cloud, "target");
+  }
+  expectMentions(
+      sentenceOf<std::invalid_argument>([&] { network.estimateDisplacements(good, good, bad); }),
+      "queries");
+  EXPECT_NO_THROW(network.estimateRigid(good, good));
+}
+
+TEST(NetworkContract, pairingRowNeedsRowsThatBelongTogether) {
+  NetworkSettings settings;
+  settings.pairing = Pairing::kRow;
+  Network network(loudWeights(Pairing::kRow), settings, 1);
+  const Points source = randomPoints(9, 1);
+  const Points target = randomPoints(9, 2);
+  EXPECT_NO_THROW(network.estimateDisplacements(source, target, source));
+  EXPECT_THROW(network.estimateDisplacements(source, randomPoints(8, 2), source),
+               std::invalid_argument);
+  EXPECT_THROW(network.estimateDisplacements(source, target, randomPoints(8, 1)),
+               std::invalid_argument);
+  EXPECT_THROW(network.estimateDisplacements(source, target, target), std::invalid_argument);
+}
+
+TEST(NetworkContract, aQuaternionOfZerosIsAnErrorNotARotation) {
+  auto weights = std::make_shared<Weights>(randomWeights(Pairing::kNearest, 1));
+  Layer& last = weights->layers.at("rigid.decoder.5");
+  last.weight.setZero();
+  last.bias.setZero();
+  Network network(weights, {}, 1);
+  const Points cloud = randomPoints(9, 1);
+  expectMentions(sentenceOf<std::runtime_error>([&] { network.estimateRigid(cloud, cloud); }),
+                 "quaternion");
+}
+
+TEST(NetworkContract, theRotationStaysARotation) {
+  NetworkSettings settings;
+  settings.rigid_iterations = 32;
+  Network network(loudWeights(Pairing::kNearest), settings, 1);
+  const Eigen::Matrix3f rotation =
+      network.estimateRigid(randomPoints(30, 1), randomPoints(30, 2)).linear();
+  EXPECT_LT((rotation * rotation.transpose() - Eigen::Matrix3f::Identity()).norm(), 1e-6F);
+  EXPECT_GT(rotation.determinant(), 0.0F);
+}
+
+TEST(NetworkContract, randomWeightsStartAtTheIdentity) {
+  Weights weights = randomWeights(Pairing::kNearest, 1);
+  for (const Eigen::Index i : {1, 2, 3, 4, 5, 6}) {
+    EXPECT_EQ(weights.layers.at("rigid.decoder.5").bias[i], 0.0F);
+  }
+  EXPECT_EQ(weights.layers.at("rigid.decoder.5").bias[0], 1.0F);
+  const Points cloud = randomPoints(100, 1);
+  NetworkSettings settings;
+  settings.rigid_iterations = 1;
+  const auto transform =
+      Network(std::make_shared<Weights>(weights), settings, 1).estimateRigid(cloud, cloud);
+  EXPECT_LT((transform.matrix() - Eigen::Matrix4f::Identity()).norm(), 0.5F);
+}
+
+TEST(NetworkContract, costsAreThoseOfThePaper) {
+  const auto giga = [](int iterations, bool with_savings) {
+    return 1e-9 * multiplyAdds(1024, 1024, iterations, Pairing::kNearest, with_savings);
+  };
+  const double encoder = 1e-9 * 1024 * 147648;
+  EXPECT_NEAR(giga(8, false), 4.56, 0.005);
+  EXPECT_NEAR(giga(8, true), 2.41, 0.01);
+  EXPECT_NEAR(giga(0, false) - encoder, 3.17, 0.005);  // with no iteration the target's is left
+  EXPECT_NEAR(giga(8, false) - giga(0, false) + encoder, 1.393, 0.0005);
+  EXPECT_LT(multiplyAdds(1024, 1024, 8, Pairing::kNone, true), 1e9 * giga(8, true));
+}
+
+TEST(Normalisation, putsTheSourceIntoTheUnitCube) {
+  const Points source = (0.05F * randomPoints(50, 1)).colwise() + Eigen::Vector3f(1, 2, 3);
+  const Normalisation normalisation = Normalisation::of(source);
+  const Points unit = normalisation.apply(source);
+  EXPECT_NEAR(unit.cwiseAbs().maxCoeff(), 1.0F, 1e-6F);
+  EXPECT_LT(unit.rowwise().mean().norm(), 1e-4F);
+  EXPECT_LT(((unit * normalisation.scale).colwise() + normalisation.offset - source).norm(), 1e-5F);
+}
+
+TEST(Normalisation, refusesCloudsWithoutALength) {
+  EXPECT_THROW(Normalisation::of(Points(3, 0)), std::invalid_argument);
+  EXPECT_THROW(Normalisation::of(Points::Ones(3, 1)), std::invalid_argument);
+  EXPECT_THROW(Normalisation::of(Points::Ones(3, 5)), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace unirit

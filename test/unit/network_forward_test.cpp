@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <gtest/gtest.h>
+
+#include "instruction_set_test.hpp"
+#include "network_reference.hpp"
+
+namespace unirit {
+namespace {
+
+using reference::loudWeights;
+using reference::randomPoints;
+
+constexpr double kTolerance = 1e-4;         // of the cloud's half extent
+constexpr double kSavingsTolerance = 1e-5;  // what leaving out repeated products may change
+
+class NetworkForward : public InstructionSetTest {
+ protected:
+  static void expectRigidAgrees(const Points& source, const Points& target, int iterations) {
+    const auto weights = loudWeights(Pairing::kNearest);
+    NetworkSettings settings;
+    settings.rigid_iterations = iterations;
+    Network network(weights, settings, 2);
+    std::vector<Eigen::Isometry3f> iterates;
+    const Eigen::Isometry3f transform = network.estimateRigid(source, target, &iterates);
+
+    const auto expected = reference::estimateRigid(*weights, source, target, iterations);
+    ASSERT_EQ(iterates.size(), expected.size());
+    EXPECT_TRUE(transform.isApprox(iterates.back(), 0.0F));
+    for (std::size_t i = 0; i < expected.size(); ++i) {
+      EXPECT_LT((iterates[i].matrix().cast<double>() - expected[i].matrix()).cwiseAbs().maxCoeff(),
+                kTolerance)
+          << "iteration " << i;
+      // The target must count, and so must each iteration, or agreement would say little.
+      EXPECT_GT((expected[i].matrix() - Eigen::Matrix4d::Identity()).norm(), 0.01);
+    }
+  }
+
+  static void expectDisplacementsAgree(Pairing pairing, const Points& source, const Points& target,
+                                       const Points& queries) {
+    const auto weights = loudWeights(pairing);
+    NetworkSettings settings;
+    settings.pairing = pairing;
+    Network network(weights, settings, 2);
+    const Points displacements = network.estimateDisplacements(source, target, queries);
+
+    const auto expected = reference::estimateDisplacements(*weights, source, target, queries);
+    ASSERT_EQ(displacements.cols(), queries.cols());
+    EXPECT_LT((displacements.cast<double>() - expected).cwiseAbs().maxCoeff(), kSavingsTolerance);
+    EXPECT_GT(expected.cwiseAbs().maxCoeff(), 0.1);
+  }
+};
+
+TEST_P(NetworkForward, runsTheInstructionSetAskedFor) {
+  EXPECT_EQ(selectKernels().instruction_set, GetParam());
+}
+
+TEST_P(NetworkForward, featuresAgreeWithTheReference) {
+  const Points source = randomPoints(203, 1);
+  const Points target = randomPoints(131, 2);
+  const auto weights = loudWeights(Pairing::kNearest);
+  NetworkSettings settings;
+  settings.rigid_iterations = 1;
+  Network network(weights, settings, 2);
+  network.estimateRigid(source, target);
+  network.estimateDisplacements(source, target, source);
+
+  const Points& a = source;
+  const Points& b = target;
+  const auto expectNear = [&](const Eigen::VectorXf& features, const std::string& module) {
+    const Eigen::VectorXd expected =
+        reference::features(*weights, module, a.cast<double>(), b.cast<double>());
+    EXPECT_LT((features.cast<double>() - expected).cwiseAbs().maxCoeff(), kTolerance) << module;
+  };
+  expectNear(network.rigidFeatures(), "rigid");
+  expectNear(network.nonRigidFeatures(), "nonrigid");
+}
+
+TEST_P(NetworkForward, everyRigidIterateAgreesWithTheReference) {
+  expectRigidAgrees(randomPoints(203, 1), randomPoints(131, 2), 8);
+}
+
+TEST_P(NetworkForward, cloudsOfOnePointAreRegistered) {
+  expectRigidAgrees(randomPoints(1, 1), randomPoints(131, 2), 2);
+  expectRigidAgrees(randomPoints(131, 1), randomPoints(1, 2), 2);
+  expectDisplacementsAgree(Pairing::kNearest, randomPoints(1, 1), randomPoints(1, 2),
+                           randomPoints(1, 3));
+}
+
+TEST_P(NetworkForward, displacementsAgreeWithTheReferenceThatSavesNothing) {
+  expectDisplacementsAgree(Pairing::kNearest, randomPoints(203, 1), randomPoints(131, 2),
+                           randomPoints(317, 3));
+  expectDisplacementsAgree(Pairing::kNone, randomPoints(203, 1), randomPoints(131, 2),
+                           randomPoints(317, 3));
+  const Points source = randomPoints(203, 1);
+  expectDisplacementsAgree(Pairing::kRow, source, randomPoints(203, 2), source);
+}
+
+TEST_P(NetworkForward, noQueriesGiveNoDisplacements) {
+  Network network(loudWeights(Pairing::kNearest), {}, 2);
+  const Points cloud = randomPoints(9, 1);
+  EXPECT_EQ(network.estimateDisplacements(cloud, cloud, Points(3, 0)).cols(), 0);
+}
+
+UNIRIT_ON_EVERY_INSTRUCTION_SET(NetworkForward);
+
+}  // namespace
+}  // namespace unirit
