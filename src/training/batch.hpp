@@ -11,15 +11,9 @@
 #include <thread>
 #include <vector>
 
-#include "unirit/point_cloud.hpp"
+#include "unirit/io/organ_folder.hpp"
 
 namespace unirit::training {
-
-/// An organ's surface and the class it is drawn by.
-struct Organ {
-  std::string name;  ///< class, "liver"
-  Surface surface;   ///< metres
-};
 
 /// Pairs in the network's unit, [B, N, 3] each.
 struct Batch {

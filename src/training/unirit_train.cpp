@@ -11,7 +11,7 @@
 #include <thread>
 
 #include "trainer.hpp"
-#include "unirit/io/surface_io.hpp"
+#include "unirit/io/organ_folder.hpp"
 #include "unirit/simulation/phantom.hpp"
 
 namespace {
@@ -20,6 +20,7 @@ using namespace unirit;            // NOLINT
 using namespace unirit::training;  // NOLINT
 
 constexpr double kMillimetre = 0.001;
+constexpr int kPhantomVertices = 5000;
 
 struct Options {
   std::vector<std::string> data;
@@ -114,33 +115,21 @@ void addOptions(CLI::App& app, Options& options) {
       ->capture_default_str();
 }
 
-std::vector<Organ> readOrgans(const Options& options) {
-  namespace fs = std::filesystem;
+std::vector<Organ> organsOf(const Options& options) {
   std::vector<Organ> organs;
   for (const std::string& folder : options.data) {
-    if (!fs::is_directory(folder)) throw std::runtime_error(folder + ": not a folder");
-    std::vector<fs::path> paths;
-    for (const auto& entry : fs::recursive_directory_iterator(folder)) {
-      if (entry.is_regular_file()) paths.push_back(entry.path());
-    }
-    std::sort(paths.begin(), paths.end());
-    for (const fs::path& path : paths) {
-      const std::string name = path.parent_path().filename();
-      if (std::count(options.exclude.begin(), options.exclude.end(), name) > 0) continue;
-      try {
-        Surface surface = readSurface(path, kMillimetre).surface;
-        if (surface.faces.cols() == 0) throw std::runtime_error(path.string() + ": has no faces");
-        organs.push_back({name, std::move(surface)});
-      } catch (const std::runtime_error& error) {
-        std::cerr << "left out: " << error.what() << '\n';
-      }
+    for (Organ& organ : readOrgans(folder, kMillimetre, options.exclude, [](const auto& sentence) {
+           std::cerr << "left out: " << sentence << '\n';
+         })) {
+      organs.push_back(std::move(organ));
     }
   }
-  for (const std::string& organ :
-       options.phantoms > 0 ? phantomOrgans() : std::vector<std::string>{}) {
-    for (int i = 0; i < options.phantoms; ++i) {
-      organs.push_back(
-          {"phantom_" + organ, makePhantom(organ, options.training.seed * 100000ULL + i, 5000)});
+  for (int i = 0; i < options.phantoms; ++i) {
+    for (const std::string& name : phantomOrgans()) {
+      const std::uint64_t patient =
+          options.training.seed * 100000ULL + static_cast<std::uint64_t>(i);
+      organs.push_back({"phantom_" + name, std::to_string(patient),
+                        makePhantom(name, patient, kPhantomVertices)});
     }
   }
   if (organs.empty()) throw std::runtime_error("no organs: give --data FOLDER or --phantoms N");
@@ -178,7 +167,7 @@ void run(Options& options) {
   }
   if (training.device.is_cuda()) training.threads = 1;
   if (training.threads > 1) torch::set_num_threads(1);
-  const auto [organs, validation] = split(readOrgans(options), options.hold_out);
+  const auto [organs, validation] = split(organsOf(options), options.hold_out);
   std::printf("training on %zu organs, validating on %zu\n", organs.size(), validation.size());
 
   Unirit model(training.pairing);

@@ -1,0 +1,167 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "max_linear.hpp"
+#include "shapes.hpp"
+#include "trainer.hpp"
+#include "unirit/simulation/phantom.hpp"
+
+namespace unirit::training {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A folder of the test's own, removed afterwards.
+class Training : public testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ =
+        fs::temp_directory_path() /
+        (std::string("unirit_") + testing::UnitTest::GetInstance()->current_test_info()->name());
+    fs::remove_all(folder_);
+    settings_.batch.pairs = 4;
+    settings_.batch.points = 32;
+    settings_.iterations = 2;
+    settings_.steps = 6;
+    settings_.report_every = 3;
+    settings_.save_every = 3;
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+
+  Weights trained(const TrainingSettings& settings, const fs::path& folder) {
+    Unirit model(settings.pairing);
+    model->setWeights(randomWeights(settings.pairing, 1));
+    return train(organs_, organs_, settings, folder, model,
+                 [&](const Progress& progress) { last_ = progress; })
+        ->weights();
+  }
+
+  fs::path folder_;
+  TrainingSettings settings_;
+  Progress last_;
+  const std::vector<Organ> organs_{{"liver", "1", makePhantom("liver", 1, 1000)}};
+};
+
+double difference(const Weights& a, const Weights& b) {
+  double largest = 0.0;
+  for (const auto& [name, layer] : a.layers) {
+    const double change = (layer.weight - b.layers.at(name).weight).cwiseAbs().maxCoeff();
+    largest = std::max(largest, change);
+  }
+  return largest;
+}
+
+TEST(MaxLinear, HasTheValueAndGradientsOfTheDenseOperation) {
+  torch::manual_seed(1);
+  const auto options = torch::requires_grad();
+  const auto values = torch::randn({3, 20, 8}, options), weight = torch::randn({16, 8}, options),
+             bias = torch::randn({16}, options);
+  const auto direction = torch::randn({3, 16});
+  const auto sparse = maxLinear(values, weight, bias);
+  const auto dense = std::get<0>(torch::linear(values, weight, bias).max(1));
+  EXPECT_TRUE(torch::allclose(sparse, dense, 1e-5, 1e-6));
+  const auto a = torch::autograd::grad({(sparse * direction).sum()}, {values, weight, bias});
+  const auto b = torch::autograd::grad({(dense * direction).sum()}, {values, weight, bias});
+  for (std::size_t i = 0; i < a.size(); ++i) EXPECT_TRUE(torch::allclose(a[i], b[i], 1e-4, 1e-5));
+}
+
+TEST(Model, WeightsRoundTrip) {
+  const Weights weights = randomWeights(Pairing::kNearest, 2);
+  Unirit model(Pairing::kNearest);
+  model->setWeights(weights);
+  EXPECT_EQ(difference(weights, model->weights()), 0.0);
+  Weights incomplete = weights;
+  incomplete.layers.erase("rigid.decoder.0");
+  EXPECT_THROW(model->setWeights(incomplete), std::invalid_argument);
+}
+
+TEST_F(Training, BatchesDependOnSeedAndNumberAlone) {
+  const Batch a = makeBatch(organs_, settings_.batch, 1, 5),
+              b = makeBatch(organs_, settings_.batch, 1, 5);
+  EXPECT_TRUE(torch::equal(a.source, b.source) && torch::equal(a.target, b.target));
+  EXPECT_FALSE(torch::equal(a.target, makeBatch(organs_, settings_.batch, 1, 6).target));
+  BatchQueue queue(organs_, settings_.batch, 1, 4, 3);
+  queue.next();
+  EXPECT_TRUE(torch::equal(queue.next().target, a.target));
+}
+
+TEST_F(Training, BatchesAreNormalisedAndTheBestRigidFitIsNearerThanNone) {
+  settings_.batch.pairs = 16;
+  const Batch batch = makeBatch(organs_, settings_.batch, 2, 0);
+  EXPECT_NEAR(batch.source.abs().max().item<float>(), 1.0F, 1e-5F);
+  EXPECT_NEAR(batch.source.mean(1).abs().max().item<float>(), 0.0F, 1e-5F);
+  const auto before = (batch.source - batch.truth).square().sum();
+  const auto after = (batch.rigid - batch.truth).square().sum();
+  EXPECT_LT(after.item<float>(), before.item<float>());
+}
+
+TEST_F(Training, LowersTheLossOnAFixedPair) {
+  settings_.batch.pairs = 1;
+  settings_.steps = 60;
+  settings_.report_every = 10;
+  settings_.iterations = 1;
+  settings_.alpha = 0.5;
+  double first = 0.0;
+  Unirit model(settings_.pairing);
+  model->setWeights(randomWeights(settings_.pairing, 1));
+  settings_.batch.rotation = settings_.batch.common_rotation = 0.0;
+  settings_.batch.partial_share = 0.0;
+  train(organs_, organs_, settings_, folder_, model, [&](const Progress& progress) {
+    if (first == 0.0) first = progress.loss;
+    last_ = progress;
+  });
+  EXPECT_LT(last_.loss, 0.8 * first);
+}
+
+TEST_F(Training, GoesOnFromItsCheckpointAsIfItHadNotStopped) {
+  const Weights whole = trained(settings_, folder_ / "whole");
+  struct CutOff {};
+  Unirit model(settings_.pairing);
+  model->setWeights(randomWeights(settings_.pairing, 1));
+  const auto cut_off = [](const Progress& progress) {
+    if (progress.step > 3) throw CutOff();  // after the checkpoint of step 3, before the next
+  };
+  const fs::path folder = folder_ / "cut";
+  EXPECT_THROW(train(organs_, organs_, settings_, folder, model, cut_off), CutOff);
+  EXPECT_EQ(difference(trained(settings_, folder), whole), 0.0);
+  EXPECT_EQ(last_.step, settings_.steps);
+
+  last_ = {};
+  EXPECT_EQ(difference(trained(settings_, folder), whole), 0.0) << "finished: nothing left to do";
+  EXPECT_EQ(last_.step, 0);
+}
+
+TEST_F(Training, LeavesTheRigidModuleAloneWhereAlphaIsOneAndTheOtherWhereItIsZero) {
+  const Weights fresh = randomWeights(settings_.pairing, 1);
+  for (const double alpha : {0.0, 1.0}) {
+    settings_.alpha = alpha;
+    const Weights weights = trained(settings_, folder_ / std::to_string(alpha));
+    for (const auto& [name, layer] : weights.layers) {
+      const bool trains = (name.rfind("rigid.", 0) == 0) == (alpha == 0.0);
+      const bool changed = layer.weight != fresh.layers.at(name).weight;
+      EXPECT_EQ(changed, trains) << name << ", alpha " << alpha;
+    }
+  }
+}
+
+TEST_F(Training, WritesCurvesAndRefusesDamagedCheckpoints) {
+  trained(settings_, folder_);
+  std::ifstream curves(folder_ / "curves.csv");
+  std::string line;
+  int lines = 0;
+  while (std::getline(curves, line)) ++lines;
+  EXPECT_EQ(lines, 1 + 2);
+  std::ofstream(folder_ / "checkpoint.pt") << "not a checkpoint";
+  try {
+    trained(settings_, folder_);
+    FAIL() << "a damaged checkpoint was taken";
+  } catch (const std::runtime_error& error) {
+    EXPECT_NE(std::string(error.what()).find("checkpoint.pt"), std::string::npos);
+  }
+}
+
+}  // namespace
+}  // namespace unirit::training
