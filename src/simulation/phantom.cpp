@@ -37,15 +37,15 @@ const std::map<std::string, Anatomy>& anatomies() {
   static const std::map<std::string, Anatomy> table{
       {"liver",
        {8.0,
-        {{{-50, 0, -12}, {-45, 5, 15}, {58, 56, 60}},        // right lobe
-         {{-40, 0, 12}, {20, -8, 20}, {44, 46, 42}},         // between the lobes
-         {{10, -14, 22}, {82, -22, 28}, {32, 32, 26}, 0.5},  // left lobe
-         ball({0, 30, 10}, {20, 20, 26})},                   // caudate lobe
-        {ball({48, 22, -82}, {84, 80, 84}),                  // stomach
-         ball({-42, 78, -58}, {36, 38, 52}),                 // right kidney
-         {{-16, -42, -56}, {-10, 4, -36}, {14, 14, 14}},     // gallbladder
-         {{14, -74, -30}, {14, -66, 80}, {7, 18, 7}},        // falciform ligament
-         {{-20, 36, -30}, {25, 30, -18}, {10, 10, 10}}}}},   // porta
+        {{{-50, 0, -12}, {-45, 5, 15}, {58, 56, 60}},       // right lobe
+         {{-40, 0, 12}, {20, -8, 20}, {44, 46, 42}},        // between the lobes
+         ball({46, -16, 24}, {60, 40, 25}),                 // left lobe
+         ball({0, 30, 10}, {20, 20, 26})},                  // caudate lobe
+        {ball({48, 22, -82}, {84, 80, 84}),                 // stomach
+         ball({-42, 78, -58}, {36, 38, 52}),                // right kidney
+         {{-16, -42, -56}, {-10, 4, -36}, {14, 14, 14}},    // gallbladder
+         {{14, -74, -30}, {14, -66, 80}, {7, 18, 7}},       // falciform ligament
+         {{-20, 36, -30}, {25, 30, -18}, {10, 10, 10}}}}},  // porta
       {"kidney",
        {5.0,
         {ball({1, 0, 27}, {25, 21, 24}),               // upper pole
@@ -122,8 +122,8 @@ class Patient {
   static Vector3d fill(double value) { return Vector3d::Constant(value); }
 
   void vary(const Vector3d& proportions, Blob& blob) {
-    const Vector3d shift = 0.05 * blob.radii.mean() * random_.uniformVector(fill(-1), fill(1));
-    blob.radii = blob.radii.cwiseProduct(random_.uniformVector(fill(0.92), fill(1.08)));
+    const Vector3d shift = 0.07 * blob.radii.mean() * random_.uniformVector(fill(-1), fill(1));
+    blob.radii = blob.radii.cwiseProduct(random_.uniformVector(fill(0.9), fill(1.1)));
     blob.from += shift;
     blob.to += shift;
     for (Vector3d* measure : {&blob.from, &blob.to, &blob.radii}) {
@@ -145,7 +145,8 @@ class Patient {
     const Vector3d axis = blob.to - blob.from;
     const double length = std::max(axis.squaredNorm(), 1e-12);
     const double t = std::clamp(axis.dot(point - blob.from) / length, 0.0, 1.0);
-    const Vector3d radii = (1.0 + t * (blob.taper - 1.0)) * blob.radii;
+    const double eased = t * t * (3.0 - 2.0 * t);  // no crease where the ends set in
+    const Vector3d radii = (1.0 + eased * (blob.taper - 1.0)) * blob.radii;
     const Vector3d scaled = (point - blob.from - t * axis).cwiseQuotient(radii);
     // To first order: the value over its gradient
     const double slope = scaled.cwiseQuotient(radii).norm();
