@@ -1,0 +1,43 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: BSD-3-Clause
+# Usage: test.sh
+# Sets up, builds, and runs every test with no display; again, the unit tests with the address and
+# undefined behaviour sanitizers. The last line is "N passed, N failed"; exit status 0 if none did.
+set -euo pipefail
+source "$(dirname "${BASH_SOURCE[0]}")/setup.sh"
+
+passed=0 failed=0 skipped=0
+
+# runTests TITLE FOLDER CTEST-OPTION...: runs them and adds to the counts.
+runTests() {
+  local log lines line
+  log=$logs/test-$(basename "$2").log
+  printf '[%(%H:%M:%S)T] %s\n' -1 "$1"
+  (cd "$2" && exec env -u DISPLAY ctest --output-on-failure --timeout 600 "${@:3}" 2>&1) |
+    tee "$log" || true # the lines tell
+  mapfile -t lines < <(grep -E '^ *[0-9]+/[0-9]+ Test +#' "$log")
+  for line in "${lines[@]:-no test was run}"; do
+    case $line in
+      *' Passed '*) passed=$((passed + 1)) ;;
+      *'***Skipped'*) skipped=$((skipped + 1)) ;;
+      *) failed=$((failed + 1)) ;;
+    esac
+  done
+}
+
+configure "$root/build" -DUNIRIT_WERROR=ON
+build "$root/build" all
+# LibTorch knows no sanitizers; and leaks are looked for, those of third parties excepted
+configure "$root/build/sanitized" -DUNIRIT_WERROR=ON -DUNIRIT_SANITIZE=ON -DUNIRIT_TRAINING=OFF
+build "$root/build/sanitized" unit_tests
+
+runTests "Running all tests" "$root/build"
+export ASAN_OPTIONS=detect_leaks=1:strict_string_checks=1
+export LSAN_OPTIONS=suppressions=$root/test/leaks.supp:print_suppressions=0
+export UBSAN_OPTIONS=print_stacktrace=1
+runTests "Running the unit tests with sanitizers" "$root/build/sanitized" --label-regex '^unit$'
+
+summary="$passed passed, $failed failed"
+if ((skipped > 0)); then summary+=", $skipped skipped"; fi
+echo "$summary"
+((failed == 0))

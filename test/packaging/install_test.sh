@@ -1,0 +1,63 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: BSD-3-Clause
+# Usage: install_test.sh BUILD PREFIX CONSUMER
+source "$(dirname "${BASH_SOURCE[0]}")/claims.bash"
+build=$1
+prefix=$2
+consumer=$3
+
+# Runs a command as a new shell would that knows the installed package and no other of this name.
+installed() {
+  # shellcheck disable=SC2016
+  env -i HOME="$prefix/home" PATH=/usr/bin:/bin ROS_HOSTNAME=localhost \
+    bash -c 'source "$0/setup.bash" && exec "$@"' "$prefix" "$@"
+}
+
+freePort() {
+  /usr/bin/python3 -c 'import socket; s = socket.socket(); s.bind(("", 0)); print(s.getsockname()[1])'
+}
+
+isFound() {
+  [[ $(installed rospack find unirit) == "$prefix/share/unirit" ]]
+}
+
+isPlugin() {
+  installed rospack plugins --attrib=plugin nodelet |
+    grep -qx "unirit $prefix/share/unirit/nodelet_plugins.xml"
+}
+
+hasFiles() {
+  local file
+  for file in share/unirit/{models/unirit.safetensors,config/unirit.yaml,rviz/demo.rviz} \
+    share/unirit/launch/{registration,replay,demo}.launch include/unirit/registration.hpp; do
+    [[ -s $prefix/$file ]] || { echo "$file is missing"; return 1; }
+  done
+}
+
+registersInDemo() {
+  local output
+  output=$(installed timeout -s INT 150 roslaunch -p "$(freePort)" unirit demo.launch \
+    rviz:=false registrations:=2 2>&1)
+  echo "$output"
+  [[ $output == *'demo: 2 of 2 registrations succeeded'* ]]
+}
+
+showsMessage() {
+  installed rosmsg show unirit/RegistrationResult | grep -q residual_rms
+}
+
+buildsConsumer() {
+  installed cmake -S "$consumer" -B "$prefix/consumer" -DPYTHON_EXECUTABLE=/usr/bin/python3 &&
+    installed cmake --build "$prefix/consumer" && installed "$prefix/consumer/consumer"
+}
+
+rm -rf "$prefix"
+mkdir -p "$prefix/home"
+claim "it can be installed" cmake --install "$build" --prefix "$prefix"
+claim "weights, configuration, launch files and headers are there" hasFiles
+claim "ROS finds the package in the prefix" isFound
+claim "nodelet managers find the plugin" isPlugin
+claim "python tools know the messages" showsMessage
+claim "the demo launched from the prefix registers" registersInDemo
+claim "another package builds against the library" buildsConsumer
+finish
