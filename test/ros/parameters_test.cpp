@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "parameters.hpp"
+
+#include <gtest/gtest.h>
+#include <yaml-cpp/yaml.h>
+
+#include <map>
+#include <set>
+#include <string>
+
+namespace unirit {
+namespace {
+
+/// Values of the shipped YAML file, as written, under names such as plausibility/min_points.
+std::map<std::string, YAML::Node> leaves(const YAML::Node& node, const std::string& prefix = "") {
+  std::map<std::string, YAML::Node> found;
+  for (const auto& entry : node) {
+    const auto name = prefix + entry.first.as<std::string>();
+    if (entry.second.IsMap())
+      found.merge(leaves(entry.second, name + "/"));
+    else
+      found[name] = entry.second;
+  }
+  return found;
+}
+
+TEST(Settings, yamlAndStructHoldTheSameDefaults) {
+  auto yaml = leaves(YAML::LoadFile(UNIRIT_CONFIG));
+  RegistrationSettings settings;
+  visitSettings(settings, [&](const char* name, auto value, auto, auto, const char*) {
+    ASSERT_EQ(yaml.count(name), 1U) << name;
+    EXPECT_EQ(yaml[name].as<decltype(value)>(), value) << name;
+    yaml.erase(name);
+  });
+  EXPECT_EQ(yaml["stages"].as<std::string>(), toString(settings.stages));
+  EXPECT_EQ(yaml["network/pairing"].as<std::string>(), toString(settings.network.pairing));
+  const NodeSettings node;
+  EXPECT_EQ(yaml["auto_register"].as<bool>(), node.auto_register);
+  EXPECT_EQ(yaml["every_cloud"].as<bool>(), node.every_cloud);
+  EXPECT_EQ(yaml["stale_after"].as<double>(), node.stale_after);
+  EXPECT_EQ(yaml["initial_pose"].size(), 0U);
+  EXPECT_FALSE(node.initial_pose);
+  EXPECT_EQ(yaml["initial_alignment"].as<std::string>(), node.initial_alignment);
+  EXPECT_EQ(yaml["fixed_frame"].as<std::string>(), node.fixed_frame);
+  EXPECT_EQ(yaml["publish_tf"].as<bool>(), node.publish_tf);
+  EXPECT_EQ(yaml["invert_tf"].as<bool>(), node.invert_tf);
+  EXPECT_EQ(yaml["tf_rate"].as<double>(), node.tf_rate);
+  EXPECT_EQ(yaml["tf_timeout"].as<double>(), node.tf_timeout);
+  EXPECT_EQ(yaml.size(), 12U) << "a name in the file that nothing here compares";
+}
+
+TEST(Settings, dynamicThresholdsAndStructHoldTheSameDefaultsAndRanges) {
+  const auto number = [](const UniritConfig& config, const std::string& name) {
+    dynamic_reconfigure::Config values;
+    config.__toMessage__(values);
+    for (const auto& value : values.doubles)
+      if (value.name == name) return value.value;
+    for (const auto& value : values.ints)
+      if (value.name == name) return static_cast<double>(value.value);
+    ADD_FAILURE() << name << " is not in the cfg file";
+    return 0.0;
+  };
+  RegistrationSettings settings;
+  std::size_t thresholds = 0;
+  visitSettings(settings,
+                [&](const std::string& name, auto value, auto minimum, auto maximum, const char*) {
+                  const std::string prefix = "plausibility/";
+                  if (name.rfind(prefix, 0) != 0) return;
+                  const std::string parameter = name.substr(prefix.size());
+                  EXPECT_EQ(number(UniritConfig::__getDefault__(), parameter), value) << name;
+                  EXPECT_EQ(number(UniritConfig::__getMin__(), parameter), minimum) << name;
+                  EXPECT_EQ(number(UniritConfig::__getMax__(), parameter), maximum) << name;
+                  ++thresholds;
+                });
+  EXPECT_EQ(UniritConfig::__getParamDescriptions__().size(), thresholds);
+}
+
+TEST(Settings, everyThresholdOfTheDynamicParametersArrives) {
+  UniritConfig config = UniritConfig::__getMax__();
+  RegistrationSettings settings;
+  settings.plausibility = fromConfig(config);
+  visitSettings(settings, [](const std::string& name, auto value, auto, auto maximum, const char*) {
+    if (name.rfind("plausibility/", 0) != 0) return;
+    EXPECT_EQ(value, maximum) << name;
+  });
+}
+
+}  // namespace
+}  // namespace unirit
