@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "register_options.hpp"
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cmath>
+#include <iostream>
+#include <vector>
+
+namespace unirit {
+namespace {
+
+const char* const kDescription =
+    "Registers the pre-operative surface of an organ (PREOP) to an intra-operative surface or "
+    "point\n"
+    "cloud (INTRAOP) and writes rigid.ply, deformed.ply and result.json. Reads PLY, PCD, STL, "
+    "OBJ.\n"
+    "Research software, not a medical device.";
+
+const char* const kExitStatus =
+    "Exit status: 0 registered, 1 internal failure, 2 unusable arguments or input (nothing is\n"
+    "written), 3 refused by a plausibility check (result.json says which).";
+
+// CLI11 may break its sentence over lines.
+std::string onOneLine(std::string text) {
+  std::replace(text.begin(), text.end(), '\n', ' ');
+  return text;
+}
+
+}  // namespace
+
+ParsedOptions parseRegisterOptions(int argc, char** argv) {
+  ParsedOptions parsed;
+  RegisterOptions& options = parsed.options;
+  std::string units = "mm";
+  std::vector<double> viewpoint;
+
+  CLI::App app(kDescription, "unirit_register");
+  app.footer(kExitStatus);
+  app.set_version_flag("--version", "unirit " UNIRIT_VERSION);
+  app.add_option("PREOP", options.preoperative, "organ's surface: a mesh or a cloud")->required();
+  app.add_option("INTRAOP", options.intraoperative, "what is seen of it")->required();
+  app.add_option("--output", options.output, "folder for the results; made if need be")
+      ->capture_default_str();
+  app.add_option("--weights", options.weights, "network's weights; default: the package's own");
+  app.add_option("--settings", options.settings, "YAML file such as config/unirit.yaml");
+  app.add_option("--stages", options.stages, "rigid,nonrigid or one of them; default: both");
+  const CLI::Option* correspondence =
+      app.add_option("--correspondence", "surface or points; for the refinement, not there yet")
+          ->expected(1);
+  app.add_option("--points", options.points,
+                 "further points of the pre-operative frame, such as a tumour: written, moved, as "
+                 "points.ply");
+  app.add_option("--viewpoint", viewpoint,
+                 "X Y Z of the sensor in INTRAOP's frame and unit; no stage so far uses it")
+      ->expected(3)
+      ->type_name("X Y Z");
+  app.add_option("--units", units, "unit of all files: mm or m")
+      ->check(CLI::IsMember({"mm", "m"}))
+      ->capture_default_str();
+  app.add_option("--threads", options.threads, "worker threads; default: that of the settings");
+  app.add_option("--seed", options.seed, "of the points drawn on the faces of a coarse mesh")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+
+  try {
+    app.parse(argc, argv);
+    if (correspondence->count() > 0) {
+      throw CLI::ValidationError("--correspondence",
+                                 "belongs to the refinement stage, which does not exist yet");
+    }
+    if (!std::all_of(viewpoint.begin(), viewpoint.end(),
+                     [](double x) { return std::isfinite(x); })) {
+      throw CLI::ValidationError("--viewpoint", "must be three finite numbers");
+    }
+  } catch (const CLI::Success& help) {
+    parsed.exit_status = app.exit(help);
+  } catch (const CLI::Error& error) {
+    std::cerr << "unirit_register: " << onOneLine(error.what()) << "\n";
+    parsed.exit_status = 2;
+  }
+  options.unit = units == "m" ? 1.0 : 0.001;
+  return parsed;
+}
+
+}  // namespace unirit

@@ -1,0 +1,161 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+#include <stdexcept>
+
+#include "register_options.hpp"
+#include "unirit/io/result_json.hpp"
+#include "unirit/io/settings_yaml.hpp"
+#include "unirit/io/surface_io.hpp"
+#include "unirit/registration.hpp"
+#include "unirit/sampling.hpp"
+
+namespace unirit {
+namespace {
+
+namespace fs = std::filesystem;
+
+enum ExitStatus { kRegistered = 0, kInternalFailure = 1, kUnusable = 2, kRefused = 3 };
+
+/// The model that comes with the package: beside the installed tool, or in the source tree.
+std::string packagedWeights() {
+  const fs::path model = fs::path("models") / "unirit.safetensors";
+  const fs::path folder = fs::read_symlink("/proc/self/exe").parent_path();
+  const fs::path installed = (folder / "../../share/unirit" / model).lexically_normal();
+  return (fs::exists(installed) ? installed : fs::path(UNIRIT_SOURCE_DIR) / model).string();
+}
+
+/// Everything read and checked; nothing written yet.
+struct Job {
+  std::shared_ptr<const Weights> weights;
+  RegistrationSettings settings;
+  SurfaceFile preoperative;
+  SurfaceFile intraoperative;
+  std::optional<Points> points;
+};
+
+Job prepare(const RegisterOptions& options) {
+  Job job;
+  job.weights = std::make_shared<const Weights>(
+      readWeights(options.weights.empty() ? packagedWeights() : options.weights));
+  job.settings.network.pairing = job.weights->pairing;
+  if (!options.settings.empty()) readSettings(options.settings, job.settings);
+  if (!options.stages.empty()) job.settings.stages = stagesFromString(options.stages);
+  if (options.threads) job.settings.threads = *options.threads;
+  validate(job.settings);
+  job.preoperative = readSurface(options.preoperative, options.unit);
+  job.intraoperative = readSurface(options.intraoperative, options.unit);
+  if (!options.points.empty()) {
+    const SurfaceFile file = readSurface(options.points, options.unit);
+    if (file.dropped > 0) {
+      throw std::runtime_error("--points \"" + options.points +
+                               "\" has points that are not finite");
+    }
+    job.points = file.surface.vertices.points;
+  }
+  if (fs::exists(options.output) && !fs::is_directory(options.output)) {
+    throw std::runtime_error("--output \"" + options.output + "\" is not a folder");
+  }
+  return job;
+}
+
+/// The vertices, followed by points on the faces where the vertices alone are too coarse.
+PointCloud cloudOf(const Surface& surface, int sampled_points, std::uint64_t seed) {
+  constexpr Eigen::Index kDensity = 4;  // points for each one that the network is given
+  PointCloud cloud{surface.vertices.points, {}};
+  const Eigen::Index wanted = kDensity * sampled_points;
+  if (surface.faces.cols() == 0 || cloud.size() >= wanted) return cloud;
+  const PointCloud samples = sampleByArea(surface, wanted, seed);
+  cloud.points.conservativeResize(Eigen::NoChange, cloud.size() + wanted);
+  cloud.points.rightCols(wanted) = samples.points;
+  return cloud;
+}
+
+Registration registerSurfaces(const Job& job, std::uint64_t seed) {
+  const int points = job.settings.sampling.points;
+  const PointCloud preoperative = cloudOf(job.preoperative.surface, points, seed);
+  const PointCloud intraoperative = cloudOf(job.intraoperative.surface, points, seed + 1);
+  return Registrar(job.weights, job.settings)
+      .registerClouds(preoperative, intraoperative, alignCentroids(preoperative, intraoperative));
+}
+
+void openFolder(const std::string& folder) {
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (::access(folder.c_str(), W_OK) != 0) {
+    throw std::runtime_error("--output \"" + folder + "\" is not a folder that can be written to");
+  }
+}
+
+void writeResults(const Job& job, const Registration& registration,
+                  const RegisterOptions& options) {
+  const auto path = [&](const char* name) { return (fs::path(options.output) / name).string(); };
+  const Points& vertices = job.preoperative.surface.vertices.points;
+  const Deformation& deformation = *registration.deformation;
+  Surface moved{{deformation.moveRigidly(vertices), {}}, job.preoperative.surface.faces};
+  writePly(moved, path("rigid.ply"), options.unit);
+  moved.vertices.points = deformation.movedSurface().leftCols(vertices.cols());
+  writePly(moved, path("deformed.ply"), options.unit);
+  if (job.points) {
+    writePly({{deformation.move(*job.points), {}}, {}}, path("points.ply"), options.unit);
+  }
+
+  std::ofstream result(path("result.json"));
+  result << toJson(registration, {fs::path(options.preoperative).filename().string(),
+                                  fs::path(options.intraoperative).filename().string(), "centroids",
+                                  job.settings.plausibility.inlier_tolerance, job.weights->sha256,
+                                  sha256(job.settings)});
+  result.close();
+  if (!result) throw std::runtime_error("Cannot write \"" + path("result.json") + "\".");
+}
+
+void report(const Job& job, const Registration& registration, const std::string& folder) {
+  for (const SurfaceFile* file : {&job.preoperative, &job.intraoperative}) {
+    if (file->dropped == 0) continue;
+    std::cout << file->dropped << " points of the "
+              << (file == &job.preoperative ? "pre-operative" : "intra-operative")
+              << " file are not finite and were left out\n";
+  }
+  std::cout << toString(registration.status) << ": " << registration.message
+            << "; surface residual " << 1e3 * registration.residual.rms << " mm, displacement "
+            << 1e3 * registration.displacement.rms << " mm (RMS); results in " << folder << "\n";
+}
+
+int fail(ExitStatus status, const std::string& sentence) {
+  std::cerr << "unirit_register: " << sentence << "\n";
+  return status;
+}
+
+int run(const RegisterOptions& options) {
+  Job job;
+  Registration registration;
+  try {
+    job = prepare(options);
+    registration = registerSurfaces(job, options.seed);
+    if (registration.status == Status::kInvalidInput)
+      throw std::runtime_error(registration.message);
+    if (registration.deformation) openFolder(options.output);
+  } catch (const std::exception& error) {
+    return fail(kUnusable, error.what());
+  }
+  if (!registration.deformation) return fail(kInternalFailure, registration.message);
+  writeResults(job, registration, options);
+  report(job, registration, options.output);
+  return registration.succeeded() ? kRegistered : kRefused;
+}
+
+}  // namespace
+}  // namespace unirit
+
+int main(int argc, char** argv) {
+  const auto parsed = unirit::parseRegisterOptions(argc, argv);
+  if (parsed.exit_status) return *parsed.exit_status;
+  try {
+    return unirit::run(parsed.options);
+  } catch (const std::exception& error) {
+    return unirit::fail(unirit::kInternalFailure, error.what());
+  }
+}
