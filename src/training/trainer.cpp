@@ -40,13 +40,20 @@ Batch slice(const Batch& batch, std::int64_t first, std::int64_t last) {
   return transformed(batch, [&](const torch::Tensor& t) { return t.slice(0, first, last); });
 }
 
+int iterationsAt(const TrainingSettings& settings, std::int64_t step) {
+  const double growth = static_cast<double>(step) / (kGrowthShare * settings.steps);
+  return std::min(settings.iterations, 1 + static_cast<int>(growth * settings.iterations));
+}
+
 /// The paper's L_total; every iteration of the rigid module learns on the detached output of the
 /// one before, so it has seen what it will be given.
 torch::Tensor totalLoss(Unirit& model, const Batch& batch, const TrainingSettings& settings,
-                        int iterations) {
+                        std::int64_t step) {
+  const double alpha = step < settings.rigid_steps ? 0.0 : settings.alpha;
+  const int iterations = iterationsAt(settings, step);
   torch::Tensor moved = batch.source;
   torch::Tensor rigid_loss = torch::zeros({}, moved.options());
-  if (settings.alpha < 1.0) {
+  if (alpha < 1.0) {
     const auto target_feature = model->rigid->encodeTarget(batch.target);
     for (int i = 0; i < iterations; ++i) {
       moved = model->rigid->forward(moved.detach(), target_feature).apply(moved.detach());
@@ -54,18 +61,18 @@ torch::Tensor totalLoss(Unirit& model, const Batch& batch, const TrainingSetting
     }
     rigid_loss = rigid_loss / iterations;
   }
-  if (settings.alpha == 0.0) return rigid_loss;
+  if (alpha == 0.0) return rigid_loss;
   moved = moved.detach();
   const auto deformed = moved + model->nonrigid->forward(moved, batch.target);
   const auto global_loss = distance(settings.loss, deformed, batch.truth, batch.target);
-  return settings.alpha * global_loss + (1.0 - settings.alpha) * rigid_loss;
+  return alpha * global_loss + (1.0 - alpha) * rigid_loss;
 }
 
 /// Sets the gradients of a step and returns its loss. On the CPU the batch is split over threads
 /// that each run forward and backward alone: small layers gain more from that than from threads
 /// inside every operation.
 double accumulateGradients(Unirit& model, const Batch& batch, const TrainingSettings& settings,
-                           int iterations) {
+                           std::int64_t step) {
   const auto parameters = model->parameters();
   const std::int64_t pairs = batch.source.size(0);
   const std::int64_t parts = std::min<std::int64_t>(settings.threads, pairs);
@@ -74,7 +81,7 @@ double accumulateGradients(Unirit& model, const Batch& batch, const TrainingSett
   const auto work = [&](std::int64_t part) {
     const std::int64_t first = part * pairs / parts, last = (part + 1) * pairs / parts;
     const double share = static_cast<double>(last - first) / static_cast<double>(pairs);
-    const auto loss = share * totalLoss(model, slice(batch, first, last), settings, iterations);
+    const auto loss = share * totalLoss(model, slice(batch, first, last), settings, step);
     const auto slot = static_cast<std::size_t>(part);
     losses[slot] = loss.item<double>();
     gradients[slot] = torch::autograd::grad({loss}, parameters, {}, {}, false, true);
@@ -129,11 +136,6 @@ double learningRate(const TrainingSettings& settings, std::int64_t step) {
   const double cosine = kFinalRate + (1.0 - kFinalRate) * (1.0 + std::cos(M_PI * progress)) / 2.0;
   return settings.learning_rate * cosine *
          std::min(1.0, (static_cast<double>(step) + 1.0) / kWarmUpSteps);
-}
-
-int iterationsAt(const TrainingSettings& settings, std::int64_t step) {
-  const double growth = static_cast<double>(step) / (kGrowthShare * settings.steps);
-  return std::min(settings.iterations, 1 + static_cast<int>(growth * settings.iterations));
 }
 
 /// Network, optimiser and progress in one file, replaced atomically.
@@ -233,7 +235,7 @@ Unirit train(const std::vector<Organ>& organs, const std::vector<Organ>& validat
     }
     const Batch batch =
         transformed(queue.next(), [&](const torch::Tensor& t) { return t.to(settings.device); });
-    loss_sum += accumulateGradients(model, batch, settings, iterationsAt(settings, step));
+    loss_sum += accumulateGradients(model, batch, settings, step);
     torch::nn::utils::clip_grad_norm_(model->parameters(), kLargestGradient);
     optimiser.step();
     ++step;

@@ -24,6 +24,7 @@ struct TrainingSettings {
   int iterations = 4;           ///< of the rigid module while training, grown from 1
   double learning_rate = 1e-3;  ///< Adam's; falls to a hundredth along a cosine
   std::int64_t steps = 20000;
+  std::int64_t rigid_steps = 0;  ///< of them, the first ones, that train the rigid module alone
   std::int64_t report_every = 100;
   std::int64_t save_every = 500;
   std::uint64_t seed = 1;

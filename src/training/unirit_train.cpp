@@ -78,6 +78,10 @@ void addOptions(CLI::App& app, Options& options) {
       ->check(CLI::Range(1, 32))
       ->capture_default_str();
   app.add_option("--steps", training.steps)->check(CLI::PositiveNumber)->capture_default_str();
+  app.add_option("--rigid-steps", training.rigid_steps,
+                 "The first of them, that train the rigid module alone")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
   app.add_option("--batch", batch.pairs, "Pairs a step")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
