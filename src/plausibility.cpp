@@ -87,7 +87,7 @@ std::vector<PlausibilityCheck> checkOutput(const Registration& registration, dou
                       registration.deformation->displacements().allFinite();
   return {PlausibilityCheck{"values that are not finite", finite ? 0.0 : 1.0, 0.0, finite},
           atMost("rotation error", rotationError(pose), kRotationTolerance),
-          atMost("surface residual over extent", registration.residual.rms / organ_extent,
+          atMost("median surface residual over extent", registration.residual.median / organ_extent,
                  settings.max_residual),
           atMost("largest displacement over extent", registration.displacement.max / organ_extent,
                  settings.max_displacement)};

@@ -35,7 +35,7 @@ struct PlausibilitySettings {
   double min_extent_ratio = 0.1;       ///< extent of the intra-operative cloud over the organ's
   double max_extent_ratio = 3.0;       ///< same, from above
   double inlier_tolerance = 0.005;     ///< cloud points nearer than this are inliers [m]
-  double max_residual = 0.06;          ///< rms distance of cloud to moved surface, over extent
+  double max_residual = 0.06;          ///< median distance of cloud to moved surface, over extent
   double max_displacement = 0.35;      ///< largest non-rigid displacement, over extent
   double max_jump_translation = 0.10;  ///< from the last accepted pose, at the organ's centroid [m]
   double max_jump_rotation = 60.0;     ///< from the last accepted pose [degree]
@@ -77,7 +77,7 @@ void visitSettings(Settings& settings, Visitor&& visitor) {
   visitor("plausibility/inlier_tolerance", p.inlier_tolerance, 0.0, 0.1,
           "cloud points nearer to the moved surface than this are inliers [m]");
   visitor("plausibility/max_residual", p.max_residual, 0.0, 1.0,
-          "rms distance of the cloud to the moved surface over the organ's extent, at most");
+          "median distance of the cloud to the moved surface over the organ's extent, at most");
   visitor("plausibility/max_displacement", p.max_displacement, 0.0, 2.0,
           "largest non-rigid displacement over the organ's extent, at most");
   visitor("plausibility/max_jump_translation", p.max_jump_translation, 0.0, 10.0,

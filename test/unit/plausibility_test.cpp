@@ -86,9 +86,9 @@ TEST(CheckOutput, RefusesRotationsThatAreNone) {
 
 TEST(CheckOutput, RefusesLargeResidualsAndDisplacementsNamingValueAndLimit) {
   Registration registration = plausible();
-  registration.residual.rms = 0.02;
+  registration.residual.median = 0.02;
   EXPECT_EQ(refusalOf(registration),
-            "refused: surface residual over extent is 0.1, the limit is 0.06");
+            "refused: median surface residual over extent is 0.1, the limit is 0.06");
   registration = plausible();
   registration.displacement.max = 0.1;
   EXPECT_EQ(refusalOf(registration),
