@@ -61,7 +61,7 @@ while (($# > 0)); do
 done
 
 source "$(dirname "${BASH_SOURCE[0]}")/setup.sh"
-"$root/scripts/build.sh" demo_camera registration_node unirit_nodelet
+"$root/scripts/build.sh" "${demo_targets[@]}"
 
 if $rviz && ! timeout 5 xdpyinfo &>/dev/null; then
   echo "No display can be opened: running without rviz."

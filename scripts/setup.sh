@@ -6,9 +6,14 @@ set -euo pipefail
 
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 logs=$root/build/log
+# What roslaunch needs for the demo.
+# shellcheck disable=SC2034
+demo_targets=(demo_camera registration_node unirit_nodelet)
 
 # Debian's python before any other: the ROS modules are there alone.
 export PATH=/usr/bin:$PATH
+# A machine's own name need not resolve; where another machine's master is named, it must.
+if [[ -z ${ROS_MASTER_URI:-}${ROS_IP:-} ]]; then export ROS_HOSTNAME=${ROS_HOSTNAME:-localhost}; fi
 
 # step TITLE LOG COMMAND...: runs the command with its output in $logs/LOG, says every 20 s how far
 # it is, and shows the end of the output where it fails.
@@ -30,6 +35,11 @@ step() {
     printf '[%(%H:%M:%S)T] failed: %s (status %d, all output in %s)\n' -1 "$title" "$status" "$log"
   fi
   return "$status"
+}
+
+# For a ROS master of one's own.
+freePort() {
+  python3 -c 'import socket; s = socket.socket(); s.bind(("", 0)); print(s.getsockname()[1])'
 }
 
 missingPackages() {

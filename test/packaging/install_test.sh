@@ -1,20 +1,17 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
-# Usage: install_test.sh BUILD PREFIX CONSUMER
+# Usage: install_test.sh BUILD PREFIX
 source "$(dirname "${BASH_SOURCE[0]}")/claims.bash"
+source "$(dirname "${BASH_SOURCE[0]}")/../../scripts/setup.sh"
 build=$1
 prefix=$2
-consumer=$3
+consumer=$root/test/packaging/consumer
 
 # Runs a command as a new shell would that knows the installed package and no other of this name.
 installed() {
   # shellcheck disable=SC2016
   env -i HOME="$prefix/home" PATH=/usr/bin:/bin ROS_HOSTNAME=localhost \
     bash -c 'source "$0/setup.bash" && exec "$@"' "$prefix" "$@"
-}
-
-freePort() {
-  /usr/bin/python3 -c 'import socket; s = socket.socket(); s.bind(("", 0)); print(s.getsockname()[1])'
 }
 
 isFound() {
