@@ -119,52 +119,56 @@ class MarchingTetrahedra {
   std::vector<Eigen::Vector3i> faces_;
 };
 
-Eigen::Vector3d gradient(const Solid& solid, const Eigen::Vector3d& point, double step) {
-  Eigen::Vector3d result;
-  for (int axis = 0; axis < 3; ++axis) {
-    const Eigen::Vector3d offset = step * Eigen::Vector3d::Unit(axis);
-    result[axis] = (solid(point + offset) - solid(point - offset)) / (2.0 * step);
-  }
-  return result;
-}
+/// Value and gradient, by differences.
+struct Slope {
+  double value;
+  Eigen::Vector3d gradient;
 
-// Moves each vertex halfway to the mean of its neighbours and back onto the surface (by Newton's
-// method).
-void evenOut(const Solid& solid, double step, Surface& surface) {
-  Points& points = surface.vertices.points;
+  Slope(const Solid& solid, const Eigen::Vector3d& point, double step) : value(solid(point)) {
+    for (int axis = 0; axis < 3; ++axis) {
+      gradient[axis] = (solid(point + step * Eigen::Vector3d::Unit(axis)) - value) / step;
+    }
+  }
+};
+
+/// Each vertex halfway to the mean of its neighbours.
+Points relaxed(const Surface& surface) {
+  const Points& points = surface.vertices.points;
   Points sums = Points::Zero(3, points.cols());
   Eigen::RowVectorXf counts = Eigen::RowVectorXf::Zero(points.cols());
   for (Eigen::Index face = 0; face < surface.faces.cols(); ++face) {
     for (int k = 0; k < 3; ++k) {
-      const int from = surface.faces(k, face), to = surface.faces((k + 1) % 3, face);
-      sums.col(to) += points.col(from);
+      const int to = surface.faces((k + 1) % 3, face);
+      sums.col(to) += points.col(surface.faces(k, face));
       counts[to] += 1.0F;
     }
   }
-  for (Eigen::Index i = 0; i < points.cols(); ++i) {
-    Eigen::Vector3d point = (0.5F * (points.col(i) + sums.col(i) / counts[i])).cast<double>();
-    for (int k = 0; k < 2; ++k) {
-      const Eigen::Vector3d slope = gradient(solid, point, step);
-      point -= solid(point) / std::max(slope.squaredNorm(), 0.1) * slope;
-    }
-    points.col(i) = point.cast<float>();
-  }
+  return 0.5F * (points.array() + sums.array().rowwise() / counts.array());
 }
 
 }  // namespace
 
-Surface meshSolid(const Solid& solid, const Eigen::AlignedBox3d& box, double spacing) {
-  Surface surface = MarchingTetrahedra(solid, box, spacing).run();
-  const double step = 1e-4 * box.sizes().maxCoeff();
-  for (int i = 0; i < kSmoothingSteps; ++i) evenOut(solid, step, surface);
-  surface.vertices.normals.resize(3, surface.vertices.size());
-  for (Eigen::Index i = 0; i < surface.vertices.size(); ++i) {
-    surface.vertices.normals.col(i) =
-        gradient(solid, surface.vertices.points.col(i).cast<double>(), step)
-            .normalized()
-            .cast<float>();
+Surface cutOut(const Solid& solid, const Eigen::AlignedBox3d& box, double spacing) {
+  return MarchingTetrahedra(solid, box, spacing).run();
+}
+
+void evenOut(const Solid& solid, Surface& surface) {
+  Points& points = surface.vertices.points;
+  const double step = 1e-5 * extent(points);
+  for (int round = 0; round < kSmoothingSteps; ++round) {
+    points = relaxed(surface);
+    for (Eigen::Index i = 0; i < points.cols(); ++i) {  // Newton's step back onto the surface
+      const Eigen::Vector3d point = points.col(i).cast<double>();
+      const Slope slope(solid, point, step);
+      const double steepness = std::max(slope.gradient.squaredNorm(), 0.1);
+      points.col(i) = (point - slope.value / steepness * slope.gradient).cast<float>();
+    }
   }
-  return surface;
+  surface.vertices.normals.resize(3, points.cols());
+  for (Eigen::Index i = 0; i < points.cols(); ++i) {
+    const Slope slope(solid, points.col(i).cast<double>(), step);
+    surface.vertices.normals.col(i) = slope.gradient.normalized().cast<float>();
+  }
 }
 
 }  // namespace unirit

@@ -12,8 +12,11 @@ namespace unirit {
 using Solid = std::function<double(const Eigen::Vector3d&)>;
 
 /// The surface of `solid` within `box`, closed where the solid does not reach the box's sides, with
-/// outward faces and normals. Marching tetrahedra (Doi and Koide 1991) on a grid of about
-/// `spacing`, then its vertices are evened out along the surface.
-Surface meshSolid(const Solid& solid, const Eigen::AlignedBox3d& box, double spacing);
+/// outward faces. Marching tetrahedra (Doi and Koide 1991) on a grid of the given spacing.
+Surface cutOut(const Solid& solid, const Eigen::AlignedBox3d& box, double spacing);
+
+/// Moves the vertices of such a surface along it until their triangles are of even size, and gives
+/// them outward normals.
+void evenOut(const Solid& solid, Surface& surface);
 
 }  // namespace unirit

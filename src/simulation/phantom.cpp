@@ -197,9 +197,10 @@ Surface makePhantom(const std::string& organ, std::uint64_t seed, int approximat
   // constant
   const double coarse = patient.box().sizes().maxCoeff() / 24.0;
   const double vertices =
-      static_cast<double>(meshSolid(patient, patient.box(), coarse).vertices.size());
-  Surface surface =
-      meshSolid(patient, patient.box(), coarse * std::sqrt(vertices / approximate_vertices));
+      static_cast<double>(cutOut(patient, patient.box(), coarse).vertices.size());
+  const double spacing = coarse * std::sqrt(vertices / approximate_vertices);
+  Surface surface = cutOut(patient, patient.box(), spacing);
+  evenOut(patient, surface);
 
   constexpr float kMetresPerMillimetre = 0.001F;
   Points& points = surface.vertices.points;
