@@ -8,8 +8,8 @@
 namespace unirit {
 namespace {
 
-// Waking the threads costs more than reading fewer weights than this
-constexpr long kParallelWeights = 1L << 20;
+// Multiplying a row with fewer weights than this takes no longer than waking a thread
+constexpr long kItemWeights = 1L << 19;
 
 }  // namespace
 
@@ -38,11 +38,14 @@ std::size_t DenseLayer::paddedOutputs() const {
 }
 
 void DenseLayer::applyToRow(const float* input, float* output, Workspace& workspace) const {
-  const bool parallel = view_.panel_count * width_ * view_.inputs >= kParallelWeights;
-#pragma omp parallel for num_threads(workspace.threads()) schedule(static) if (parallel)
-  for (long panel = 0; panel < view_.panel_count; ++panel) {
-    workspace.kernels().dense(view_, {input, 0, 1}, panel, panel + 1, output, 0);
-  }
+  const long panels_per_item =
+      std::clamp(kItemWeights / (width_ * view_.inputs), 1L, view_.panel_count);
+  const long items = (view_.panel_count + panels_per_item - 1) / panels_per_item;
+  workspace.team().forEach(items, [&](int, long item) {
+    const long first = item * panels_per_item;
+    const long end = std::min(first + panels_per_item, view_.panel_count);
+    workspace.kernels().dense(view_, {input, 0, 1}, first, end, output, 0);
+  });
 }
 
 std::vector<DenseLayer> packLayers(const Kernels& kernels, const Weights& weights,

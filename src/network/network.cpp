@@ -20,8 +20,7 @@ void requireCloud(const Points& points, const std::string& name) {
   }
 }
 
-void requireFit(const std::shared_ptr<const Weights>& weights, const NetworkSettings& settings,
-                int threads) {
+void requireFit(const std::shared_ptr<const Weights>& weights, const NetworkSettings& settings) {
   if (!weights) {
     throw std::invalid_argument("weights: none were given");
   }
@@ -32,9 +31,6 @@ void requireFit(const std::shared_ptr<const Weights>& weights, const NetworkSett
   }
   if (settings.rigid_iterations < 1) {
     throw std::invalid_argument("settings.rigid_iterations: must be at least 1");
-  }
-  if (threads < 1) {
-    throw std::invalid_argument("threads: must be at least 1");
   }
   validate(*weights);
 }
@@ -66,7 +62,7 @@ struct Network::Implementation {
 
 Network::Network(std::shared_ptr<const Weights> weights, const NetworkSettings& settings,
                  int threads) {
-  requireFit(weights, settings, threads);
+  requireFit(weights, settings);
   implementation_ = std::make_unique<Implementation>(std::move(weights), settings, threads);
 }
 

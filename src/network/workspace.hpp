@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <omp.h>
-
 #include <algorithm>
 #include <vector>
 
 #include "aligned_floats.hpp"
 #include "kernels.hpp"
+#include "thread_team.hpp"
 #include "unirit/network/architecture.hpp"
 
 namespace unirit {
@@ -28,30 +27,29 @@ struct Scratch {
   std::vector<int> nearest = std::vector<int>(kBlockRows);
 };
 
-/// The kernels, the number of threads and their memory; allocated once.
+/// The kernels, the threads and their memory; allocated once.
 class Workspace {
  public:
   Workspace(const Kernels& kernels, int threads)
-      : kernels_(kernels), scratches_(static_cast<std::size_t>(threads)) {}
+      : kernels_(kernels), team_(threads), scratches_(static_cast<std::size_t>(threads)) {}
 
   const Kernels& kernels() const { return kernels_; }
-  int threads() const { return static_cast<int>(scratches_.size()); }
+  ThreadTeam& team() { return team_; }
   std::vector<Scratch>& scratches() { return scratches_; }
 
   /// Calls work(scratch, begin, count) for every block of `total` points, spread over the threads.
   template <class Work>
   void forEachBlock(long total, const Work& work) {
-    const long blocks = (total + kBlockRows - 1) / kBlockRows;
-#pragma omp parallel for num_threads(threads()) schedule(dynamic)
-    for (long block = 0; block < blocks; ++block) {
+    team_.forEach((total + kBlockRows - 1) / kBlockRows, [&](int thread, long block) {
       const long begin = block * kBlockRows;
-      work(scratches_[static_cast<std::size_t>(omp_get_thread_num())], begin,
+      work(scratches_[static_cast<std::size_t>(thread)], begin,
            std::min(kBlockRows, total - begin));
-    }
+    });
   }
 
  private:
   const Kernels& kernels_;
+  ThreadTeam team_;
   std::vector<Scratch> scratches_;
 };
 

@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <benchmark/benchmark.h>
+
+#include <memory>
+
+#include "unirit/network/network.hpp"
+#include "unirit/random.hpp"
+
+/// What all measurements share: one pair of clouds of 1024 points, one set of weights.
+namespace unirit::speed {
+
+inline constexpr Eigen::Index kPoints = 1024;
+inline constexpr Eigen::Index kVertices = 20000;
+inline constexpr int kRigidIterations = 8;
+
+inline Points randomPoints(Eigen::Index count, std::uint64_t seed) {
+  Random random(seed);
+  return Points::NullaryExpr(3, count, [&] { return static_cast<float>(random.uniform(-1, 1)); });
+}
+
+inline const Points& source() {
+  static const Points points = randomPoints(kPoints, 1);
+  return points;
+}
+
+inline const Points& target() {
+  static const Points points = randomPoints(kPoints, 2);
+  return points;
+}
+
+/// Speed does not depend on the weights' values.
+inline const std::shared_ptr<const Weights>& weights() {
+  static const auto random = std::make_shared<const Weights>(randomWeights(Pairing::kNearest, 1));
+  return random;
+}
+
+/// Shows the rate that `multiply_adds` an iteration make.
+inline void setRate(benchmark::State& state, double multiply_adds) {
+  state.counters["GFLOP/s"] =
+      benchmark::Counter(2e-9 * multiply_adds, benchmark::Counter::kIsIterationInvariantRate);
+}
+
+inline double forwardMultiplyAdds() {
+  return multiplyAdds(kPoints, kPoints, kRigidIterations, Pairing::kNearest, true);
+}
+
+}  // namespace unirit::speed

@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "thread_team.hpp"
+
+#include <stdexcept>
+
+namespace unirit {
+
+ThreadTeam::ThreadTeam(int size) {
+  if (size < 1) {
+    throw std::invalid_argument("threads: must be at least 1");
+  }
+  for (int thread = 1; thread < size; ++thread) {
+    workers_.emplace_back([this, thread] { serve(thread); });
+  }
+}
+
+ThreadTeam::~ThreadTeam() {
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    stopping_ = true;
+  }
+  wake_.notify_all();
+  for (std::thread& worker : workers_) {
+    worker.join();
+  }
+}
+
+void ThreadTeam::run(long count, const Job& job) {
+  const bool shared = count > 1 && !workers_.empty();
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    count_ = count;
+    next_item_ = 0;
+    if (shared) {
+      job_ = &job;
+      ++job_number_;
+    }
+  }
+  if (shared) {
+    wake_.notify_all();
+  }
+  takeItems(0, job);
+
+  // Closed to workers that have not begun; those that have finish their item
+  std::unique_lock<std::mutex> lock(mutex_);
+  job_ = nullptr;
+  idle_.wait(lock, [this] { return busy_workers_ == 0; });
+}
+
+void ThreadTeam::serve(int thread) {
+  unsigned long last_job = 0;
+  std::unique_lock<std::mutex> lock(mutex_);
+  while (true) {
+    wake_.wait(lock, [&] { return stopping_ || (job_ != nullptr && job_number_ != last_job); });
+    if (stopping_) {
+      return;
+    }
+    last_job = job_number_;
+    const Job& job = *job_;
+    ++busy_workers_;
+    lock.unlock();
+    takeItems(thread, job);
+    lock.lock();
+    if (--busy_workers_ == 0) {
+      idle_.notify_one();
+    }
+  }
+}
+
+void ThreadTeam::takeItems(int thread, const Job& job) {
+  for (long item = next_item_++; item < count_; item = next_item_++) {
+    job(thread, item);
+  }
+}
+
+}  // namespace unirit
