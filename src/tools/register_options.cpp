@@ -3,9 +3,9 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <iostream>
-#include <vector>
 
 namespace unirit {
 namespace {
@@ -33,7 +33,7 @@ ParsedOptions parseRegisterOptions(int argc, char** argv) {
   ParsedOptions parsed;
   RegisterOptions& options = parsed.options;
   std::string units = "mm";
-  std::vector<double> viewpoint;
+  std::array<double, 3> viewpoint{};
 
   CLI::App app(kDescription, "unirit_register");
   app.footer(kExitStatus);
@@ -52,8 +52,7 @@ ParsedOptions parseRegisterOptions(int argc, char** argv) {
                  "further points of the pre-operative frame, such as a tumour: written, moved, as "
                  "points.ply");
   app.add_option("--viewpoint", viewpoint,
-                 "X Y Z of the sensor in INTRAOP's frame and unit; no stage so far uses it")
-      ->expected(3)
+                 "where the sensor stood, in INTRAOP's frame and unit; no stage so far uses it")
       ->type_name("X Y Z");
   app.add_option("--units", units, "unit of all files: mm or m")
       ->check(CLI::IsMember({"mm", "m"}))
