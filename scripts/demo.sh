@@ -73,10 +73,18 @@ set +u
 source "$root/build/devel/setup.bash"
 set -u
 
+# A master that runs already may be a robot's, or another demo's.
+if [[ ${ROS_MASTER_URI:-http://localhost:11311} == http://localhost:11311 ]] &&
+  (exec 3<>/dev/tcp/localhost/11311) 2>/dev/null; then
+  ROS_MASTER_URI=http://localhost:$(freePort)
+  export ROS_MASTER_URI
+  echo "A ROS master is running already; that of the demo is ROS_MASTER_URI=$ROS_MASTER_URI"
+fi
+
 # roslaunch ends with 0 however its nodes end; its log says more.
-export ROS_LOG_DIR=$logs/demo
+export ROS_LOG_DIR=$logs/demo ROSCONSOLE_STDOUT_LINE_BUFFERED=1
 rm -rf "$ROS_LOG_DIR"
-roslaunch unirit demo.launch "rviz:=$rviz" "${arguments[@]}" &
+roslaunch --no-summary --disable-title unirit demo.launch "rviz:=$rviz" "${arguments[@]}" &
 launch=$!
 trap 'kill -INT "$launch" 2>/dev/null || true' INT TERM
 status=0
