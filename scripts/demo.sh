@@ -92,7 +92,10 @@ while kill -0 "$launch" 2>/dev/null; do wait "$launch" || status=$?; done
 
 outcome=$(grep -rhA 1 --include='roslaunch-*.log' 'REQUIRED process' "$ROS_LOG_DIR" || true)
 case $outcome in
-  *'finished cleanly'*) exit 0 ;;
+  *'finished cleanly'*)
+    echo "The demo has come to its end."
+    exit 0
+    ;;
   *'has died'*) exit 1 ;;
   *) exit $((status == 0 ? 130 : status)) ;;
 esac
