@@ -209,7 +209,7 @@ void Demo::report(const RegistrationResult& result, const TrueErrors& errors) {
   tally_.add(result, errors);
   std::printf("%s\n", describe(result, errors).c_str());
   std::fflush(stdout);
-  visualization_msgs::Marker text = statusText(result, errors, 0.06 * scene_.organExtent());
+  visualization_msgs::Marker text = statusText(result, errors, 0.07 * scene_.organExtent());
   text.header = header(kCameraFrame, ros::Time());
   text.pose.position.y = -0.6 * scene_.organExtent();  // above the organ as the camera sees it
   text.pose.position.z = scene_.cameraDistance();

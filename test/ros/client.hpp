@@ -20,8 +20,6 @@
 namespace unirit::test {
 
 inline constexpr double kDeadline = 30.0;  // of every wait [s]; generous for a loaded machine
-inline constexpr char kOrganFrame[] = "organ";
-inline constexpr char kCameraFrame[] = "camera";
 
 /// Everything a registration node is told and says. Waits end at the deadline with a test failure.
 /// Needs a spinner that runs beside it.

@@ -10,6 +10,9 @@
 
 namespace unirit::test {
 
+inline constexpr char kOrganFrame[] = "organ";
+inline constexpr char kCameraFrame[] = "camera";
+
 /// A smooth organ-like surface of 0.2 m extent, without symmetries: 3 x count [m].
 Points organ(int count = 800);
 
