@@ -89,8 +89,9 @@ Eigen::Isometry3f Network::estimateRigid(const Points& source, const Points& tar
 
     // Apply the step
     const Eigen::Matrix3f step_rotation = step.rotation.toRotationMatrix();
-    for (auto point : network.moved.colwise()) {
-      point = (step_rotation * point + step.translation).eval();
+    for (Eigen::Index column = 0; column < network.moved.cols(); ++column) {
+      network.moved.col(column) =
+          (step_rotation * network.moved.col(column) + step.translation).eval();
     }
 
     // Compose, and keep the rotation a rotation
