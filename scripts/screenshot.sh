@@ -47,7 +47,7 @@ isDrawn() {
   (($(countRegistrations) >= enough))
 }
 
-Xvfb -displayfd 3 -screen 0 1600x1000x24 -nolisten tcp 3>"$scratch/display" 2>/dev/null &
+Xvfb -displayfd 3 -screen 0 1280x800x24 -nolisten tcp 3>"$scratch/display" 2>/dev/null &
 processes+=($!)
 waitUntil 30 "the virtual display" test -s "$scratch/display"
 DISPLAY=:$(<"$scratch/display")

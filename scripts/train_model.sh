@@ -14,5 +14,5 @@ organs=$(realpath "$1") output=$(realpath -m "$2")
 source "$(dirname "${BASH_SOURCE[0]}")/setup.sh"
 
 exec "$root/build/devel/lib/unirit/unirit_train" --data "$organs" --phantoms 6 --output "$output" \
-  --steps 9000 --rigid-steps 4000 --alpha 0.5 --batch 32 --points 256 --threads 2 --seed 1 \
+  --steps 7000 --rigid-steps 4000 --alpha 0.5 --batch 32 --points 256 --threads 2 --seed 1 \
   --report-every 250 --save-every 250
