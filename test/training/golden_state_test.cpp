@@ -94,7 +94,7 @@ TEST_P(GoldenState, WholeNetworkAgrees) {
 
 INSTANTIATE_TEST_SUITE_P(Pairings, GoldenState,
                          testing::Values(Pairing::kNearest, Pairing::kNone, Pairing::kRow),
-                         [](const auto& info) { return std::string(toString(info.param)); });
+                         [](const auto& pairing) { return std::string(toString(pairing.param)); });
 
 }  // namespace
 }  // namespace unirit
