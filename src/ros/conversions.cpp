@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <cstring>
 #include <limits>
+#include <numeric>
 #include <optional>
 #include <sstream>
 
@@ -179,6 +180,15 @@ PointCloud2 toMessage(const Points& points, const Points& displacements,
   message.data.resize(static_cast<std::size_t>(rows.size()) * sizeof(float));
   std::memcpy(message.data.data(), rows.data(), message.data.size());
   return message;
+}
+
+PointCloud2 toMessage(const Points& points, const std_msgs::Header& header) {
+  ReceivedCloud all;
+  all.total = points.cols();
+  all.kept.resize(static_cast<std::size_t>(points.cols()));
+  std::iota(all.kept.begin(), all.kept.end(), 0);
+  all.cloud.points = points;
+  return toMessage(points, Points(3, 0), all, header);
 }
 
 PointCloud2 emptyCloud(const std_msgs::Header& header) {

@@ -29,6 +29,9 @@ ReceivedCloud fromMessage(const sensor_msgs::PointCloud2& message, const std::st
 sensor_msgs::PointCloud2 toMessage(const Points& points, const Points& displacements,
                                    const ReceivedCloud& source, const std_msgs::Header& header);
 
+/// Message with x y z [m] for the points, in their order.
+sensor_msgs::PointCloud2 toMessage(const Points& points, const std_msgs::Header& header);
+
 /// A cloud of no points: takes the place of one that no longer holds.
 sensor_msgs::PointCloud2 emptyCloud(const std_msgs::Header& header);
 

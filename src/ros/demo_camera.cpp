@@ -62,14 +62,6 @@ std_msgs::Header header(const std::string& frame, ros::Time stamp) {
   return made;
 }
 
-sensor_msgs::PointCloud2 toMessage(const Points& points, const std_msgs::Header& at) {
-  ReceivedCloud all;
-  all.total = points.cols();
-  for (Eigen::Index i = 0; i < points.cols(); ++i) all.kept.push_back(i);
-  all.cloud.points = points;
-  return toMessage(points, Points(3, 0), all, at);
-}
-
 /// Plays the operating room to a registration node and compares what it answers with the truth.
 class Demo {
  public:
