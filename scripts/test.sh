@@ -8,6 +8,16 @@ source "$(dirname "${BASH_SOURCE[0]}")/setup.sh"
 
 passed=0 failed=0 skipped=0
 
+# The last line, also where it did not come to the tests.
+finish() {
+  local status=$? skips=
+  if ((status != 0 && failed == 0)); then failed=1; fi
+  if ((skipped > 0)); then skips=", $skipped skipped"; fi
+  echo "$passed passed, $failed failed$skips"
+  exit $((failed > 0))
+}
+trap finish EXIT
+
 # runTests TITLE FOLDER CTEST-OPTION...: runs them and adds to the counts.
 runTests() {
   local log lines line
@@ -36,8 +46,3 @@ runTests "Running all tests" "$root/build"
 export ASAN_OPTIONS=detect_leaks=1:strict_string_checks=1
 export UBSAN_OPTIONS=print_stacktrace=1
 runTests "Running the unit tests with sanitizers" "$root/build/sanitized" --label-regex '^unit$'
-
-summary="$passed passed, $failed failed"
-if ((skipped > 0)); then summary+=", $skipped skipped"; fi
-echo "$summary"
-((failed == 0))
