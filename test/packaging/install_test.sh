@@ -50,7 +50,9 @@ buildsConsumer() {
 
 rm -rf "$prefix"
 mkdir -p "$prefix/home"
-claim "it can be installed" cmake --install "$build" --prefix "$prefix"
+# Catkin's setup files take the prefix that was configured, whatever `cmake --install` is told
+claim "a prefix can be chosen" cmake -DCMAKE_INSTALL_PREFIX="$prefix" "$build"
+claim "it can be installed" cmake --install "$build"
 claim "weights, configuration, launch files and headers are there" hasFiles
 claim "ROS finds the package in the prefix" isFound
 claim "nodelet managers find the plugin" isPlugin
