@@ -1,10 +1,13 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
-# Usage: install_test.sh BUILD PREFIX
+# Usage: install_test.sh BUILD
 source "$(dirname "${BASH_SOURCE[0]}")/claims.bash"
 source "$(dirname "${BASH_SOURCE[0]}")/../../scripts/setup.sh"
 build=$1
-prefix=$2
+# Outside of the source tree, where roslaunch would find the installed launch files beside ours
+prefix=$(mktemp -d)
+configured=$(sed -n 's/^CMAKE_INSTALL_PREFIX:[A-Z]*=//p' "$build/CMakeCache.txt")
+trap 'rm -rf "$prefix"; cmake -DCMAKE_INSTALL_PREFIX="$configured" "$build" >/dev/null' EXIT
 consumer=$root/test/packaging/consumer
 
 # Runs a command as a new shell would that knows the installed package and no other of this name.
@@ -48,7 +51,6 @@ buildsConsumer() {
     installed cmake --build "$prefix/consumer" && installed "$prefix/consumer/consumer"
 }
 
-rm -rf "$prefix"
 mkdir -p "$prefix/home"
 # Catkin's setup files take the prefix that was configured, whatever `cmake --install` is told
 claim "a prefix can be chosen" cmake -DCMAKE_INSTALL_PREFIX="$prefix" "$build"
