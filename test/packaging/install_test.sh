@@ -42,8 +42,9 @@ registersInDemo() {
   [[ $output == *'demo: 2 of 2 registrations succeeded'* ]]
 }
 
-showsMessage() {
-  installed rosmsg show unirit/RegistrationResult | grep -q residual_rms
+knowsMessages() {
+  installed rosmsg show unirit/RegistrationResult | grep -q residual_rms &&
+    installed python3 -c 'import unirit.msg, unirit.srv; unirit.srv.RegisterRequest()'
 }
 
 buildsConsumer() {
@@ -58,7 +59,7 @@ claim "it can be installed" cmake --install "$build"
 claim "weights, configuration, launch files and headers are there" hasFiles
 claim "ROS finds the package in the prefix" isFound
 claim "nodelet managers find the plugin" isPlugin
-claim "python tools know the messages" showsMessage
+claim "python tools know the messages" knowsMessages
 claim "the demo launched from the prefix registers" registersInDemo
 claim "another package builds against the library" buildsConsumer
 finish
