@@ -40,7 +40,7 @@ countRegistrations() {
 }
 
 rvizListens() {
-  rosnode info /rviz 2>/dev/null | grep -q '/unirit/deformed'
+  [[ $(rosnode info /rviz 2>/dev/null) == */unirit/deformed* ]]
 }
 
 isDrawn() {

@@ -23,7 +23,7 @@ isFound() {
 
 isPlugin() {
   installed rospack plugins --attrib=plugin nodelet |
-    grep -qx "unirit $prefix/share/unirit/nodelet_plugins.xml"
+    grep -x "unirit $prefix/share/unirit/nodelet_plugins.xml"
 }
 
 hasFiles() {
@@ -43,7 +43,7 @@ registersInDemo() {
 }
 
 knowsMessages() {
-  installed rosmsg show unirit/RegistrationResult | grep -q residual_rms &&
+  installed rosmsg show unirit/RegistrationResult | grep residual_rms >/dev/null &&
     installed python3 -c 'import unirit.msg, unirit.srv; unirit.srv.RegisterRequest()'
 }
 
