@@ -84,13 +84,13 @@ fi
 # roslaunch ends with 0 however its nodes end; its log says more.
 export ROS_LOG_DIR=$logs/demo ROSCONSOLE_STDOUT_LINE_BUFFERED=1
 rm -rf "$ROS_LOG_DIR"
-roslaunch --no-summary --disable-title unirit demo.launch "rviz:=$rviz" "${arguments[@]}" &
+roslaunch --no-summary --disable-title "$root/launch/demo.launch" "rviz:=$rviz" "${arguments[@]}" &
 launch=$!
 trap 'kill -INT "$launch" 2>/dev/null || true' INT TERM
 status=0
 while kill -0 "$launch" 2>/dev/null; do wait "$launch" || status=$?; done
 
-outcome=$(grep -rhA 1 --include='roslaunch-*.log' 'REQUIRED process' "$ROS_LOG_DIR" || true)
+outcome=$(grep -rhsA 1 --include='roslaunch-*.log' 'REQUIRED process' "$ROS_LOG_DIR" || true)
 case $outcome in
   *'finished cleanly'*)
     echo "The demo has come to its end."
