@@ -38,6 +38,9 @@ struct RegistrationPair {
   Points source_normals;  ///< 3 x N, outwards
   Points target;          ///< 3 x N, what is seen
   Points truth;           ///< 3 x N, where each source point truly went, in the target's frame
+  Points interior;        ///< 3 x M, points inside the organ, in the source's frame
+  Points interior_truth;  ///< 3 x M, where they truly went, in the target's frame
+  Points surface;         ///< 3 x S, samples of the true deformed surface, in the target's frame
   Eigen::Isometry3d best_rigid = Eigen::Isometry3d::Identity();  ///< least squares source -> truth
   std::optional<Eigen::Vector3f> viewpoint;  ///< where the camera stood, in the target's frame
 };
