@@ -17,6 +17,9 @@ namespace {
 
 constexpr double kDeformation = 0.075;  // RMS over the extent
 constexpr Eigen::Index kMeasuredPoints = 1500;
+constexpr Eigen::Index kSourcePool = 10000;
+constexpr Eigen::Index kInteriorPoints = 200;
+constexpr Eigen::Index kSurfaceSamples = 20000;
 constexpr double kCameraDistance = 4.0;  // half extents from the organ's centre
 constexpr double kOutlierBox = 0.6;      // of the bounding box's sides, from its centre
 constexpr std::array<Protocol, 7> kProtocols{
@@ -63,6 +66,15 @@ void disturb(const View& view, const PointCloud& surface, Points& target, Random
   for (const Eigen::Index i : draw(target.cols(), outliers, random)) {
     target.col(i) = random.uniformVector(centre - reach, centre + reach).cast<float>();
   }
+}
+
+/// The first of the surface's points, drawn towards the centroid at the origin.
+Points interiorOf(const Points& surface, Random& random) {
+  Points interior = surface.leftCols(std::min(surface.cols(), kInteriorPoints));
+  for (Eigen::Index i = 0; i < interior.cols(); ++i) {
+    interior.col(i) *= static_cast<float>(random.uniform(0.3, 0.85));
+  }
+  return interior;
 }
 
 Points moved(const Eigen::Isometry3d& pose, const Points& points) {
@@ -140,15 +152,20 @@ DeformedOrgan::DeformedOrgan(const Surface& organ, std::uint64_t seed, Eigen::In
       select(vertices, draw(vertices.cols(), std::min(vertices.cols(), kMeasuredPoints), random));
   const ThinPlateSpline spline =
       randomDeformation(measured, kDeformation * 2.0 * half_extent_, random.next());
-  source_pool_ = sampleByArea(centred, pool, random.next());
+  source_pool_ = sampleByArea(centred, std::min(pool, kSourcePool), random.next());
   truth_pool_ = source_pool_.points + spline.displacements(source_pool_.points);
   Surface deformed = centred;
   deformed.vertices.points += spline.displacements(vertices);
   target_pool_ = sampleByArea(deformed, pool, random.next());
+  interior_ = interiorOf(measured, random);
+  interior_truth_ = interior_ + spline.displacements(interior_);
 }
 
-RegistrationPair DeformedOrgan::pair(const View& view, Eigen::Index points,
-                                     std::uint64_t seed) const {
+RegistrationPair DeformedOrgan::pair(const View& view, Eigen::Index points, std::uint64_t seed,
+                                     Eigen::Index surface_samples) const {
+  if (surface_samples > target_pool_.size()) {
+    throw std::invalid_argument("surface_samples: more than the pool holds");
+  }
   Random random(seed);
   RegistrationPair pair;
   const auto rows = draw(source_pool_.size(), points, random);
@@ -180,6 +197,9 @@ RegistrationPair DeformedOrgan::pair(const View& view, Eigen::Index points,
       view.offset * random.direction();
   pair.target = moved(pose, pair.target);
   pair.truth = moved(pose, pair.truth);
+  pair.interior = interior_;
+  pair.interior_truth = moved(pose, interior_truth_);
+  pair.surface = moved(pose, target_pool_.points.leftCols(surface_samples));
   pair.best_rigid = bestRigidFit(pair.source, pair.truth);
   if (view.visible_share < 1.0) pair.viewpoint = (pose * camera.cast<double>()).cast<float>();
   return pair;
@@ -189,7 +209,8 @@ RegistrationPair makePair(const Surface& organ, Protocol protocol, Eigen::Index 
                           std::uint64_t seed) {
   Random random(seed);
   const std::uint64_t organ_seed = random.next();
-  return DeformedOrgan(organ, organ_seed).pair(viewOf(protocol), points, random.next());
+  return DeformedOrgan(organ, organ_seed)
+      .pair(viewOf(protocol), points, random.next(), kSurfaceSamples);
 }
 
 Eigen::Isometry3d bestRigidFit(const Points& from, const Points& to) {

@@ -102,6 +102,51 @@ TEST(Pair, OffsetMovesTheTargetHalfAMetreAway) {
   EXPECT_NEAR((centroid(pair.target) - centroid(pair.source)).norm(), 0.5F, 0.06F);
 }
 
+TEST(Pair, InteriorPointsLieInsideAndMoveWithTheirOrgan) {
+  const Surface mesh = organ();  // a box of 0.2 x 0.12 x 0.08 m
+  const RegistrationPair pair = makePair(mesh, Protocol::kCaseB, 256, 8);
+  ASSERT_EQ(pair.interior.cols(), 200);
+  const Eigen::Array3f half(0.1F, 0.06F, 0.04F);
+  for (Eigen::Index i = 0; i < pair.interior.cols(); ++i) {
+    EXPECT_TRUE((pair.interior.col(i).array().abs() < 0.86F * half).all());
+    EXPECT_TRUE((pair.interior.col(i).array().abs() > 0.29F * half).any());
+  }
+  // With the true rigid part taken away, what is left is the deformation alone.
+  const Points rigid = (pair.best_rigid * pair.interior.cast<double>()).cast<float>();
+  const double left = rootMeanSquareDistance(rigid, pair.interior_truth);
+  EXPECT_GT(left, 0.001);
+  EXPECT_LT(left, 0.075 * extent(mesh.vertices.points));
+  EXPECT_EQ(makePair(mesh, Protocol::kCaseB, 256, 8).interior_truth, pair.interior_truth);
+}
+
+TEST(Pair, SurfaceSamplesLieWhereTheSourceTrulyWent) {
+  const Surface mesh = organ();
+  for (const Protocol protocol : {Protocol::kResampled, Protocol::kIntraop, Protocol::kOffset}) {
+    const RegistrationPair pair = makePair(mesh, protocol, 1024, 9);
+    ASSERT_EQ(pair.surface.cols(), 20000);
+    const Eigen::RowVectorXf distances = nearestDistances(pair.truth, pair.surface);
+    EXPECT_LT(distances.mean(), 0.0015F) << toString(protocol);
+  }
+}
+
+TEST(Pair, SurfaceSamplesAreMadeOnlyWhereAskedFor) {
+  const DeformedOrgan deformed(organ(), 10, 2000);
+  const View view = viewOf(Protocol::kCaseB);
+  EXPECT_EQ(deformed.pair(view, 256, 1).surface.cols(), 0);
+  EXPECT_EQ(deformed.pair(view, 256, 1, 2000).surface.cols(), 2000);
+  EXPECT_THROW(deformed.pair(view, 256, 1, 2001), std::invalid_argument);
+}
+
+TEST(Pair, TheSameSeedGivesEveryProtocolTheSameSourceAndDeformation) {
+  const Surface mesh = organ();
+  const RegistrationPair paired = makePair(mesh, Protocol::kPaired, 256, 11);
+  for (const Protocol protocol : {Protocol::kResampled, Protocol::kPartial}) {
+    const RegistrationPair other = makePair(mesh, protocol, 256, 11);
+    EXPECT_EQ(other.source, paired.source) << toString(protocol);
+    EXPECT_EQ(other.truth, paired.truth) << toString(protocol);
+  }
+}
+
 TEST(Pair, RefusesMorePointsThanTheViewHolds) {
   EXPECT_THROW(makePair(organ(), Protocol::kPartial, 20000, 7), std::invalid_argument);
 }

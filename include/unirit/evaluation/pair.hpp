@@ -38,7 +38,7 @@ struct RegistrationPair {
   Points source_normals;  ///< 3 x N, outwards
   Points target;          ///< 3 x N, what is seen
   Points truth;           ///< 3 x N, where each source point truly went, in the target's frame
-  Points interior;        ///< 3 x M, points inside the organ, in the source's frame
+  Points interior;        ///< 3 x M, at most 200 points inside the organ, in the source's frame
   Points interior_truth;  ///< 3 x M, where they truly went, in the target's frame
   Points surface;         ///< 3 x S, samples of the true deformed surface, in the target's frame
   Eigen::Isometry3d best_rigid = Eigen::Isometry3d::Identity();  ///< least squares source -> truth
@@ -49,21 +49,27 @@ struct RegistrationPair {
 /// which pairs are drawn. The RMS is measured over up to 1500 vertices.
 class DeformedOrgan {
  public:
-  /// `pool`: how many points are sampled on either surface for pairs to draw from.
+  /// `pool`: how many points are sampled on the deformed surface for pairs to draw from; on the
+  /// organ's own as many, at most 10,000.
   DeformedOrgan(const Surface& organ, std::uint64_t seed, Eigen::Index pool = 30000);
 
-  /// `points` source and target points under the view. Deterministic for a seed. Throws
-  /// std::invalid_argument where the visible share of the pool holds fewer points.
-  RegistrationPair pair(const View& view, Eigen::Index points, std::uint64_t seed) const;
+  /// `points` source and target points under the view, and the first `surface_samples` of the pool
+  /// as `surface`. Deterministic for a seed. Throws std::invalid_argument where the pool or its
+  /// visible share holds fewer points.
+  RegistrationPair pair(const View& view, Eigen::Index points, std::uint64_t seed,
+                        Eigen::Index surface_samples = 0) const;
 
  private:
   PointCloud source_pool_;
   Points truth_pool_;
   PointCloud target_pool_;
+  Points interior_;
+  Points interior_truth_;
   double half_extent_ = 0.0;  // of the undeformed vertices [m]
 };
 
-/// A pair as the protocol says: DeformedOrgan and View in one call.
+/// A pair as the protocol says: DeformedOrgan and View in one call, with 20,000 samples of the true
+/// surface. The same seed gives every protocol the same source and deformation.
 RegistrationPair makePair(const Surface& organ, Protocol protocol, Eigen::Index points,
                           std::uint64_t seed);
 
