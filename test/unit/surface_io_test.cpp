@@ -6,111 +6,11 @@
 #include <pcl/io/pcd_io.h>
 #include <pcl/io/ply_io.h>
 #include <pcl/point_types.h>
-#include <unistd.h>
 
-#include <algorithm>
-#include <cstring>
-#include <filesystem>
-#include <fstream>
+#include "surface_files.hpp"
 
-namespace unirit {
+namespace unirit::test {
 namespace {
-
-namespace fs = std::filesystem;
-
-const char* const kCorners = "0 0 0\n1 0 0\n0 1 0\n0 0 1\n";
-const char* const kFaces = "3 0 2 1\n3 0 1 3\n";
-
-class SurfaceIo : public ::testing::Test {
- protected:
-  void SetUp() override {
-    folder_ = fs::temp_directory_path() / ("unirit_surface_io_" + std::to_string(::getpid()));
-    fs::create_directories(folder_);
-  }
-  void TearDown() override { fs::remove_all(folder_); }
-
-  std::string path(const std::string& name) const { return (folder_ / name).string(); }
-
-  std::string write(const std::string& name, const std::string& bytes) const {
-    std::ofstream(path(name), std::ios::binary) << bytes;
-    return path(name);
-  }
-
-  SurfaceFile read(const std::string& name, const std::string& bytes) const {
-    return readSurface(write(name, bytes), 1.0);
-  }
-
-  // The sentence a file is refused with; empty where it is read.
-  std::string refusal(const std::string& name, const std::string& bytes) const {
-    try {
-      read(name, bytes);
-    } catch (const std::runtime_error& error) {
-      EXPECT_NE(std::string(error.what()).find(name), std::string::npos) << error.what();
-      return error.what();
-    }
-    return {};
-  }
-
-  fs::path folder_;
-};
-
-std::string plyHeader(const std::string& format, const std::string& coordinate = "float",
-                      const std::string& list = "list uchar int vertex_indices") {
-  return "ply\nformat " + format + " 1.0\ncomment made by hand\nelement vertex 4\nproperty " +
-         coordinate + " x\nproperty " + coordinate + " y\nproperty " + coordinate +
-         " z\nelement face 2\nproperty " + list + "\nend_header\n";
-}
-
-std::string textPly() { return plyHeader("ascii") + kCorners + kFaces; }
-
-template <class Number>
-void append(std::string& bytes, Number number, bool swap) {
-  char raw[sizeof(Number)];
-  std::memcpy(raw, &number, sizeof(Number));
-  if (swap) std::reverse(raw, raw + sizeof(Number));
-  bytes.append(raw, sizeof(Number));
-}
-
-std::string binaryPly(bool big_endian) {
-  std::string bytes = plyHeader(big_endian ? "binary_big_endian" : "binary_little_endian");
-  const bool swap = big_endian == (__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__);
-  for (const float c : {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1}) append<float>(bytes, c, swap);
-  for (const auto& face : {std::array<int, 3>{0, 2, 1}, std::array<int, 3>{0, 1, 3}}) {
-    bytes += '\3';
-    for (const int corner : face) append(bytes, corner, swap);
-  }
-  return bytes;
-}
-
-std::string binaryStl(const std::string& header) {
-  std::string bytes = header + std::string(80 - header.size(), ' ');
-  append<std::uint32_t>(bytes, 2, false);
-  for (const auto& facet : {std::array<float, 9>{0, 0, 0, 0, 1, 0, 1, 0, 0},
-                            std::array<float, 9>{0, 0, 0, 1, 0, 0, 0, 0, 1}}) {
-    for (int k = 0; k < 3; ++k) append(bytes, 0.0F, false);
-    for (const float coordinate : facet) append(bytes, coordinate, false);
-    append<std::uint16_t>(bytes, 0, false);
-  }
-  return bytes;
-}
-
-std::string textStl() {
-  const std::string facet = " facet normal 0 0 1\n  outer loop\n";
-  const std::string end = "  endloop\n endfacet\n";
-  return "solid two facets\n" + facet + "vertex 0 0 0\nvertex 0 1 0\nvertex 1 0 0\n" + end + facet +
-         "vertex -0 0 0\nvertex 1 0 0\nvertex 0 0 1\n" + end + "endsolid two facets\n";
-}
-
-std::string textObj() {
-  return "# by hand\nmtllib a.mtl\nv 0 0 0 0.5 0.5 0.5\nv 1 0 0\nv 0 1 0\nv 0 0 1\nvt 0 0\n"
-         "vn 0 0 1\nf 1/1/1 3//1 2/1\nf -4 -3 -1\n";
-}
-
-std::string textPcd() {
-  return "# .PCD v0.7\nVERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 4\n"
-         "HEIGHT 1\nVIEWPOINT 0.5 -2 3 1 0 0 0\nPOINTS 4\nDATA ascii\n" +
-         std::string(kCorners);
-}
 
 void expectCorners(const SurfaceFile& file) {
   Points corners(3, 4);
@@ -287,59 +187,5 @@ TEST_F(SurfaceIo, SaysWhereItCannotWrite) {
   EXPECT_THROW(writePly({}, folder_.string(), 1.0), std::runtime_error);
 }
 
-TEST_F(SurfaceIo, NamesTheFault) {
-  const auto says = [&](const std::string& sentence, const std::string& words) {
-    return sentence.find(words) != std::string::npos ? ::testing::AssertionSuccess()
-                                                     : ::testing::AssertionFailure() << sentence;
-  };
-  const auto ply = [](std::string bytes, const std::string& from, const std::string& to) {
-    return bytes.replace(bytes.find(from), from.size(), to);
-  };
-  EXPECT_TRUE(says(refusal("a.txt", "1 2 3"), "extension"));
-  EXPECT_TRUE(says(refusal("a.ply", ""), "does not begin with \"ply\""));
-  EXPECT_TRUE(says(refusal("a.ply", ply(textPly(), "3 0 1 3", "3 0 1 4")), "does not exist"));
-  EXPECT_TRUE(says(refusal("a.ply", ply(textPly(), "3 0 1 3", "3 0 1 -1")), "does not exist"));
-  EXPECT_TRUE(says(refusal("a.ply", ply(textPly(), "vertex 4", "vertex 99999999999")), "promises"));
-  EXPECT_TRUE(says(refusal("a.ply", ply(textPly(), "vertex 4", "vertex 5")), "at \"face\" 1 of 2"));
-  EXPECT_TRUE(says(refusal("a.ply", ply(textPly(), "vertex 4", "vertex -4")), "negative"));
-  EXPECT_TRUE(says(refusal("a.ply", ply(textPly(), "float x", "float w")), "lack x, y or z"));
-  EXPECT_TRUE(says(refusal("a.ply", ply(textPly(), "1 0 0", "1 O 0")), "vertex\" 2 of 4"));
-  EXPECT_TRUE(says(refusal("a.ply", ply(textPly(), "3 0 1 3", "2 0 1")), "2 corners"));
-  EXPECT_TRUE(says(refusal("a.obj", "v 0 0 0\nf 1 2 3\n"), "does not exist"));
-  EXPECT_TRUE(says(refusal("a.obj", "v 0 0\n"), "in line 1"));
-  EXPECT_TRUE(says(refusal("a.obj", "# nothing\n"), "no finite point"));
-  EXPECT_TRUE(says(refusal("a.stl", binaryStl("cut").substr(0, 180)), "shorter than"));
-  EXPECT_TRUE(says(refusal("a.stl", textStl().substr(0, 100)), "endsolid"));
-  EXPECT_TRUE(says(refusal("a.pcd", ply(textPcd(), "POINTS 4", "POINTS 5")), "do not fit"));
-  EXPECT_TRUE(says(refusal("a.pcd", ply(textPcd(), "SIZE 4 4 4", "SIZE 4 4")), "do not fit"));
-  EXPECT_TRUE(says(refusal("a.pcd", ply(textPcd(), "DATA ascii", "DATA morse")), "morse"));
-  EXPECT_TRUE(says(refusal("a.pcd", ply(textPcd(), "0 1 0", "nan nan")), "point 4 of 4"));
-  fs::create_directories(path("folder.ply"));
-  EXPECT_THROW(readSurface(path("folder.ply"), 1.0), std::runtime_error);
-  EXPECT_THROW(readSurface(path("missing.ply"), 1.0), std::runtime_error);
-}
-
-TEST_F(SurfaceIo, SurvivesFilesCutAtAnyByteAndBytesThatFlip) {
-  pcl::PointCloud<pcl::PointXYZ> cloud(40, 1, {1.0F, 2.0F, 3.0F});
-  pcl::io::savePCDFileBinaryCompressed(path("compressed.pcd"), cloud);
-  std::ifstream file(path("compressed.pcd"), std::ios::binary);
-  const std::string compressed{std::istreambuf_iterator<char>(file), {}};
-  const std::pair<const char*, std::string> samples[] = {
-      {"text.ply", textPly()}, {"little.ply", binaryPly(false)}, {"big.ply", binaryPly(true)},
-      {"text.stl", textStl()}, {"binary.stl", binaryStl("x")},   {"mesh.obj", textObj()},
-      {"text.pcd", textPcd()}, {"packed.pcd", compressed}};
-  for (const auto& [name, bytes] : samples) {
-    int refused = 0;
-    for (std::size_t length = 0; length < bytes.size(); ++length) {
-      refused += refusal(name, bytes.substr(0, length)).empty() ? 0 : 1;
-      constexpr char kValues[] = {'\0', '9', '\x7f', '\xff'};
-      std::string flipped = bytes;
-      flipped[length] = kValues[length % 4];
-      refusal(name, flipped);
-    }
-    EXPECT_GT(refused, static_cast<int>(bytes.size() / 4)) << name;
-  }
-}
-
 }  // namespace
-}  // namespace unirit
+}  // namespace unirit::test
