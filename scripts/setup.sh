@@ -78,9 +78,12 @@ installPackages() {
     aptGet install --no-install-recommends "${missing[@]}"
 }
 
-# configure FOLDER OPTION...: runs CMake unless it ran there with the same options before.
+# configure FOLDER OPTION...: runs CMake unless it ran there with the same options before. Warnings
+# are errors where the variable UNIRIT_WERROR is ON.
 configure() {
-  local folder=$1 options="${*:2}"
+  local folder=$1
+  set -- "${@:2}" "-DUNIRIT_WERROR=${UNIRIT_WERROR:-OFF}"
+  local options=$*
   if [[ -f $folder/Makefile && -f $folder/options && $(<"$folder/options") == "$options" ]]; then
     return
   fi
@@ -88,7 +91,7 @@ configure() {
   rm -f "$folder/options"
   step "Configuring $folder" "configure-$(basename "$folder").log" \
     cmake -S "$root" -B "$folder" -G "Unix Makefiles" -DCMAKE_BUILD_TYPE=Release \
-    -DPYTHON_EXECUTABLE=/usr/bin/python3 -DPython3_EXECUTABLE=/usr/bin/python3 "${@:2}"
+    -DPYTHON_EXECUTABLE=/usr/bin/python3 -DPython3_EXECUTABLE=/usr/bin/python3 "$@"
   printf '%s\n' "$options" >"$folder/options"
 }
 
