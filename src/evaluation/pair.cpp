@@ -2,7 +2,6 @@
 #include "unirit/evaluation/pair.hpp"
 
 #include <algorithm>
-#include <array>
 #include <numeric>
 #include <stdexcept>
 #include <utility>
@@ -22,9 +21,6 @@ constexpr Eigen::Index kInteriorPoints = 200;
 constexpr Eigen::Index kSurfaceSamples = 20000;
 constexpr double kCameraDistance = 4.0;  // half extents from the organ's centre
 constexpr double kOutlierBox = 0.6;      // of the bounding box's sides, from its centre
-constexpr std::array<Protocol, 7> kProtocols{
-    Protocol::kPaired,  Protocol::kPermuted, Protocol::kResampled, Protocol::kCaseB,
-    Protocol::kPartial, Protocol::kOffset,   Protocol::kIntraop};
 
 /// `count` of the first `available` indices, without replacement, in random sequence.
 std::vector<Eigen::Index> draw(Eigen::Index available, Eigen::Index count, Random& random) {
@@ -83,65 +79,6 @@ Points moved(const Eigen::Isometry3d& pose, const Points& points) {
 
 }  // namespace
 
-const char* toString(Protocol protocol) {
-  switch (protocol) {
-    case Protocol::kPaired:
-      return "paired";
-    case Protocol::kPermuted:
-      return "permuted";
-    case Protocol::kResampled:
-      return "resampled";
-    case Protocol::kCaseB:
-      return "caseb";
-    case Protocol::kPartial:
-      return "partial";
-    case Protocol::kOffset:
-      return "offset";
-    case Protocol::kIntraop:
-      return "intraop";
-  }
-  return "unknown";
-}
-
-Protocol protocolFromString(const std::string& name) {
-  for (const Protocol protocol : kProtocols) {
-    if (name == toString(protocol)) return protocol;
-  }
-  throw std::invalid_argument("protocol: unknown protocol '" + name + "'");
-}
-
-View viewOf(Protocol protocol) {
-  View view;
-  switch (protocol) {
-    case Protocol::kPaired:
-      view.target = View::Target::kPaired;
-      break;
-    case Protocol::kPermuted:
-      view.target = View::Target::kPermuted;
-      break;
-    case Protocol::kResampled:
-      break;
-    case Protocol::kOffset:
-      view.offset = 0.5;
-      [[fallthrough]];
-    case Protocol::kCaseB:
-      view.rotation = 45.0;
-      view.translation = 0.2;
-      break;
-    case Protocol::kPartial:
-      view.visible_share = 0.4;
-      break;
-    case Protocol::kIntraop:
-      view.visible_share = 0.35;
-      view.rotation = 20.0;
-      view.translation = 0.1;
-      view.noise = 0.0015;
-      view.outlier_share = 0.05;
-      break;
-  }
-  return view;
-}
-
 DeformedOrgan::DeformedOrgan(const Surface& organ, std::uint64_t seed, Eigen::Index pool) {
   Random random(seed);
   Surface centred = organ;
@@ -163,54 +100,88 @@ DeformedOrgan::DeformedOrgan(const Surface& organ, std::uint64_t seed, Eigen::In
 
 RegistrationPair DeformedOrgan::pair(const View& view, Eigen::Index points, std::uint64_t seed,
                                      Eigen::Index surface_samples) const {
+  Random random(seed);
+  const DeformedPoints drawn = drawPoints(points, surface_samples, random);
+  return joinPair(drawn, see(view, drawn.truth, random));
+}
+
+DeformedPoints DeformedOrgan::drawPoints(Eigen::Index points, Eigen::Index surface_samples,
+                                         Random& random) const {
   if (surface_samples > target_pool_.size()) {
     throw std::invalid_argument("surface_samples: more than the pool holds");
   }
-  Random random(seed);
-  RegistrationPair pair;
   const auto rows = draw(source_pool_.size(), points, random);
-  pair.source = select(source_pool_.points, rows);
-  pair.source_normals = select(source_pool_.normals, rows);
-  pair.truth = select(truth_pool_, rows);
+  return {select(source_pool_.points, rows),
+          select(source_pool_.normals, rows),
+          select(truth_pool_, rows),
+          interior_,
+          interior_truth_,
+          target_pool_.points.leftCols(surface_samples)};
+}
 
+Sight DeformedOrgan::see(const View& view, const Points& truth, Random& random) const {
+  const Eigen::Index points = truth.cols();
   const Eigen::Vector3f camera =
       (kCameraDistance * half_extent_ * random.direction()).cast<float>();
+  Sight sight;
   if (view.target == View::Target::kPaired) {
-    pair.target = pair.truth;
+    sight.target = truth;
   } else if (view.target == View::Target::kPermuted) {
-    pair.target = select(pair.truth, draw(points, points, random));
+    sight.target = select(truth, draw(points, points, random));
   } else if (view.visible_share < 1.0) {
     const auto visible = facing(target_pool_, camera, view.visible_share);
     auto seen = draw(static_cast<Eigen::Index>(visible.size()), points, random);
     for (Eigen::Index& index : seen) index = visible[static_cast<std::size_t>(index)];
-    pair.target = select(target_pool_.points, seen);
+    sight.target = select(target_pool_.points, seen);
   } else {
-    pair.target = select(target_pool_.points, draw(target_pool_.size(), points, random));
+    sight.target = select(target_pool_.points, draw(target_pool_.size(), points, random));
   }
-  disturb(view, target_pool_, pair.target, random);
+  disturb(view, target_pool_, sight.target, random);
 
-  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
-  pose.linear() = random.rotation(view.rotation);
+  sight.pose = Eigen::Isometry3d::Identity();
+  sight.pose.linear() = random.rotation(view.rotation);
   const double reach = view.translation * half_extent_;
-  pose.translation() =
+  sight.pose.translation() =
       random.uniformVector(Eigen::Vector3d::Constant(-reach), Eigen::Vector3d::Constant(reach)) +
       view.offset * random.direction();
-  pair.target = moved(pose, pair.target);
-  pair.truth = moved(pose, pair.truth);
-  pair.interior = interior_;
-  pair.interior_truth = moved(pose, interior_truth_);
-  pair.surface = moved(pose, target_pool_.points.leftCols(surface_samples));
+  sight.target = moved(sight.pose, sight.target);
+  if (view.visible_share < 1.0) {
+    sight.viewpoint = (sight.pose * camera.cast<double>()).cast<float>();
+  }
+  return sight;
+}
+
+RegistrationPair joinPair(const DeformedPoints& points, const Sight& sight) {
+  RegistrationPair pair;
+  pair.source = points.source;
+  pair.source_normals = points.source_normals;
+  pair.target = sight.target;
+  pair.truth = moved(sight.pose, points.truth);
+  pair.interior = points.interior;
+  pair.interior_truth = moved(sight.pose, points.interior_truth);
+  pair.surface = moved(sight.pose, points.surface);
   pair.best_rigid = bestRigidFit(pair.source, pair.truth);
-  if (view.visible_share < 1.0) pair.viewpoint = (pose * camera.cast<double>()).cast<float>();
+  pair.viewpoint = sight.viewpoint;
   return pair;
+}
+
+SeenOrgan makeSeenOrgan(const Surface& organ, const std::vector<Protocol>& protocols,
+                        Eigen::Index points, Eigen::Index surface_samples, std::uint64_t seed) {
+  Random random(seed);
+  const DeformedOrgan deformed(organ, random.next());
+  Random draws(random.next());
+  SeenOrgan seen{deformed.drawPoints(points, surface_samples, draws), {}};
+  for (const Protocol protocol : protocols) {
+    Random own = draws;  // every protocol goes on from the same draws
+    seen.sights.push_back(deformed.see(viewOf(protocol), seen.points.truth, own));
+  }
+  return seen;
 }
 
 RegistrationPair makePair(const Surface& organ, Protocol protocol, Eigen::Index points,
                           std::uint64_t seed) {
-  Random random(seed);
-  const std::uint64_t organ_seed = random.next();
-  return DeformedOrgan(organ, organ_seed)
-      .pair(viewOf(protocol), points, random.next(), kSurfaceSamples);
+  const SeenOrgan seen = makeSeenOrgan(organ, {protocol}, points, kSurfaceSamples, seed);
+  return joinPair(seen.points, seen.sights.front());
 }
 
 Eigen::Isometry3d bestRigidFit(const Points& from, const Points& to) {

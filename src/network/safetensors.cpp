@@ -131,25 +131,33 @@ TensorFile parseSafetensors(std::string_view file) {
   return content;
 }
 
-std::string formatSafetensors(const TensorFile& content) {
+std::string formatSafetensorsHeader(const std::map<std::string, std::string>& metadata,
+                                    const std::map<std::string, TensorLayout>& tensors) {
   Json json;
-  json[kMetadataKey] = content.metadata;
-  std::size_t offset = 0;
-  for (const auto& [name, tensor] : content.tensors) {
+  json[kMetadataKey] = metadata;
+  std::uint64_t offset = 0;
+  for (const auto& [name, tensor] : tensors) {
     json[name] = {{"dtype", tensor.type},
                   {"shape", tensor.shape},
-                  {"data_offsets", {offset, offset + tensor.bytes.size()}}};
-    offset += tensor.bytes.size();
+                  {"data_offsets", {offset, offset + tensor.size}}};
+    offset += tensor.size;
   }
   std::string header = json.dump(-1, ' ', false, Json::error_handler_t::replace);
   header.append((8 - header.size() % 8) % 8, ' ');
 
-  std::string file;
-  file.reserve(kLengthBytes + header.size() + offset);
+  std::string bytes;
   for (std::size_t i = 0; i < kLengthBytes; ++i) {
-    file += static_cast<char>((static_cast<std::uint64_t>(header.size()) >> (8 * i)) & 0xFF);
+    bytes += static_cast<char>((static_cast<std::uint64_t>(header.size()) >> (8 * i)) & 0xFF);
   }
-  file += header;
+  return bytes + header;
+}
+
+std::string formatSafetensors(const TensorFile& content) {
+  std::map<std::string, TensorLayout> layouts;
+  for (const auto& [name, tensor] : content.tensors) {
+    layouts[name] = {tensor.type, tensor.shape, tensor.bytes.size()};
+  }
+  std::string file = formatSafetensorsHeader(content.metadata, layouts);
   for (const auto& [name, tensor] : content.tensors) {
     file += tensor.bytes;
   }

@@ -27,6 +27,17 @@ struct TensorFile {
 /// continues "the file ...".
 TensorFile parseSafetensors(std::string_view file);
 
+/// A tensor whose bytes are written apart.
+struct TensorLayout {
+  std::string type;
+  std::vector<std::uint64_t> shape;
+  std::uint64_t size = 0;  ///< [byte]
+};
+
+/// What stands before the tensors' bytes, which follow in the map's sequence, without gaps.
+std::string formatSafetensorsHeader(const std::map<std::string, std::string>& metadata,
+                                    const std::map<std::string, TensorLayout>& tensors);
+
 /// The bytes of a file with these tensors, its data aligned to 8 bytes.
 std::string formatSafetensors(const TensorFile& content);
 

@@ -8,6 +8,7 @@
 #include <set>
 #include <stdexcept>
 
+#include "../atomic_file.hpp"
 #include "safetensors.hpp"
 #include "unirit/hash.hpp"
 #include "unirit/random.hpp"
@@ -152,22 +153,6 @@ std::string toHalfBytes(const Matrix& matrix, const std::string& name) {
   return bytes;
 }
 
-void writeAtomically(const std::string& bytes, const std::string& path) {
-  const std::string temporary = path + ".tmp";
-  std::ofstream stream(temporary, std::ios::binary);
-  stream.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-  stream.close();
-  std::error_code error;
-  if (stream) {
-    fs::rename(temporary, path, error);
-  }
-  if (!stream || error) {
-    std::error_code ignored;
-    fs::remove(temporary, ignored);
-    throw std::runtime_error("weights file " + path + " cannot be written");
-  }
-}
-
 }  // namespace
 
 void validate(const Weights& weights) {
@@ -220,7 +205,8 @@ void writeWeights(const Weights& weights, const std::string& path) {
     add(shape.name + ".weight", {outputs, static_cast<std::uint64_t>(shape.inputs)}, layer.weight);
     add(shape.name + ".bias", {outputs}, layer.bias);
   }
-  writeAtomically(formatSafetensors(file), path);
+  writeAtomically(path, "weights file",
+                  [&](std::ostream& stream) { stream << formatSafetensors(file); });
 }
 
 Weights randomWeights(Pairing pairing, unsigned seed) {

@@ -5,8 +5,10 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "unirit/point_cloud.hpp"
+#include "unirit/random.hpp"
 
 namespace unirit {
 
@@ -45,6 +47,25 @@ struct RegistrationPair {
   std::optional<Eigen::Vector3f> viewpoint;  ///< where the camera stood, in the target's frame
 };
 
+/// Points of a deformed organ in the source's frame: what its pairs share under every view.
+struct DeformedPoints {
+  Points source;          ///< 3 x N
+  Points source_normals;  ///< 3 x N
+  Points truth;           ///< 3 x N, where the deformation alone takes the source points
+  Points interior;        ///< 3 x M
+  Points interior_truth;  ///< 3 x M
+  Points surface;         ///< 3 x S, samples of the deformed surface
+};
+
+/// What is seen of such an organ.
+struct Sight {
+  Points target;           ///< 3 x N, in the target's frame
+  Eigen::Isometry3d pose;  ///< from the source's frame to the target's, on top of the deformation
+  std::optional<Eigen::Vector3f> viewpoint;  ///< in the target's frame
+};
+
+RegistrationPair joinPair(const DeformedPoints& points, const Sight& sight);
+
 /// An organ's surface under one random thin-plate deformation of 0.075 of its extent (RMS), from
 /// which pairs are drawn. The RMS is measured over up to 1500 vertices.
 class DeformedOrgan {
@@ -59,6 +80,11 @@ class DeformedOrgan {
   RegistrationPair pair(const View& view, Eigen::Index points, std::uint64_t seed,
                         Eigen::Index surface_samples = 0) const;
 
+  /// The two halves of a pair: the points drawn, and `truth`, of theirs, under the view.
+  DeformedPoints drawPoints(Eigen::Index points, Eigen::Index surface_samples,
+                            Random& random) const;
+  Sight see(const View& view, const Points& truth, Random& random) const;
+
  private:
   PointCloud source_pool_;
   Points truth_pool_;
@@ -72,6 +98,17 @@ class DeformedOrgan {
 /// surface. The same seed gives every protocol the same source and deformation.
 RegistrationPair makePair(const Surface& organ, Protocol protocol, Eigen::Index points,
                           std::uint64_t seed);
+
+/// A deformed organ under several views, and what they share.
+struct SeenOrgan {
+  DeformedPoints points;
+  std::vector<Sight> sights;  ///< one for each protocol, in their sequence
+};
+
+/// The pairs that makePair makes of each protocol with this seed, bit for bit, with
+/// `surface_samples` in place of the 20,000.
+SeenOrgan makeSeenOrgan(const Surface& organ, const std::vector<Protocol>& protocols,
+                        Eigen::Index points, Eigen::Index surface_samples, std::uint64_t seed);
 
 /// Least-squares rigid transform that takes `from` to `to`, column by column (Kabsch 1976).
 Eigen::Isometry3d bestRigidFit(const Points& from, const Points& to);
