@@ -14,13 +14,6 @@ namespace {
 
 constexpr std::size_t kJacobianNeighbours = 9;  // the point itself and its 8 nearest
 
-double quantile(std::vector<float> values, double share) {
-  const auto rank =
-      static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1) + 0.5);
-  std::nth_element(values.begin(), values.begin() + rank, values.end());
-  return values[static_cast<std::size_t>(rank)];
-}
-
 template <class Row>
 std::vector<float> toVector(const Row& row) {
   return {row.data(), row.data() + row.size()};
@@ -57,6 +50,14 @@ double foldedFraction(const Points& rigid, const Points& displacements) {
 }
 
 }  // namespace
+
+double quantile(std::vector<float> values, double share) {
+  if (values.empty()) throw std::invalid_argument("values: an empty list has no quantile");
+  const auto rank =
+      static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1) + 0.5);
+  std::nth_element(values.begin(), values.begin() + rank, values.end());
+  return values[static_cast<std::size_t>(rank)];
+}
 
 double rootMeanSquareDistance(const Points& a, const Points& b) {
   if (a.cols() != b.cols() || a.cols() == 0) {

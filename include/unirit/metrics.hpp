@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <vector>
+
 #include "unirit/point_cloud.hpp"
 
 namespace unirit {
@@ -22,6 +24,10 @@ struct DisplacementStatistics {
   double max = 0.0;              ///< [m]
   double folded_fraction = 0.0;  ///< share of points where the Jacobian determinant is <= 0
 };
+
+/// The value below which `share` of the values lie: the one of nearest rank, share in [0, 1].
+/// Throws std::invalid_argument where there is none.
+double quantile(std::vector<float> values, double share);
 
 /// Root mean square distance between points of the same column [m]. Throws std::invalid_argument
 /// where the sizes differ or are zero.

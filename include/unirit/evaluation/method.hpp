@@ -18,12 +18,16 @@ struct MethodResult {
 };
 
 /// A way to register: ours and its rivals, told apart by name in the benchmark's tables. It sees
-/// of a pair the source, its normals, the target and the viewpoint, never the truth. One object
-/// serves one thread.
+/// of a pair the source, its normals, the target and the viewpoint, never the truth; only an
+/// oracle, which says so in its name, sees more. One object serves one thread.
 class RegistrationMethod {
  public:
   virtual ~RegistrationMethod() = default;
   virtual std::string name() const = 0;
+
+  /// All that the result depends on beside the pair, as one word: settings, weights.
+  virtual std::string parameters() const = 0;
+
   virtual MethodResult registerPair(const RegistrationPair& pair) = 0;
 };
 

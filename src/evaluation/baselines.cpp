@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "unirit/evaluation/baselines.hpp"
+
+#include <algorithm>
+
+namespace unirit {
+namespace {
+
+/// A method is timed on one thread, and networks are run as they were trained.
+RegistrationSettings forWeights(const Weights& weights, RegistrationSettings settings) {
+  settings.threads = 1;
+  settings.network.pairing = weights.pairing;
+  return settings;
+}
+
+}  // namespace
+
+MethodResult movedRigidly(const RegistrationPair& pair, const Eigen::Isometry3d& pose) {
+  const auto moved = [&](const Points& points) -> Points {
+    return (pose * points.cast<double>()).cast<float>();
+  };
+  return {false, moved(pair.source), moved(pair.interior), pose};
+}
+
+MethodResult Identity::registerPair(const RegistrationPair& pair) {
+  return movedRigidly(pair, Eigen::Isometry3d::Identity());
+}
+
+MethodResult BestRigidOracle::registerPair(const RegistrationPair& pair) {
+  return movedRigidly(pair, pair.best_rigid);
+}
+
+Unirit::Unirit(std::shared_ptr<const Weights> weights, const RegistrationSettings& settings,
+               bool align_centroids)
+    : weights_hash_(weights->sha256),
+      align_centroids_(align_centroids),
+      registrar_(weights, forWeights(*weights, settings)) {}
+
+std::string Unirit::name() const {
+  std::string stages = toString(registrar_.settings().stages);
+  std::replace(stages.begin(), stages.end(), ',', '+');
+  return "unirit " + stages;
+}
+
+std::string Unirit::parameters() const {
+  return "weights=" + weights_hash_ + ":settings=" + sha256(registrar_.settings()) +
+         ":start=" + (align_centroids_ ? "centroids" : "identity");
+}
+
+MethodResult Unirit::registerPair(const RegistrationPair& pair) {
+  const PointCloud source{pair.source, pair.source_normals}, target{pair.target, Points()};
+  const Eigen::Isometry3d start =
+      align_centroids_ ? alignCentroids(source, target) : Eigen::Isometry3d::Identity();
+  const Registration registration = registrar_.registerClouds(source, target, start);
+  if (!registration.succeeded()) {
+    MethodResult result = movedRigidly(pair, start);
+    result.refused = true;
+    return result;
+  }
+  return {false, registration.deformation->movedSurface(),
+          registration.deformation->move(pair.interior),
+          registration.T_intraoperative_preoperative};
+}
+
+}  // namespace unirit

@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "benchmark_cases.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <iostream>
+#include <memory>
+#include <stdexcept>
+
+#include "unirit/evaluation/case_folder.hpp"
+#include "unirit/io/organ_folder.hpp"
+#include "unirit/random.hpp"
+#include "unirit/simulation/phantom.hpp"
+
+namespace unirit {
+namespace {
+
+constexpr double kMillimetre = 0.001;
+constexpr std::uint64_t kUnseenPatients = 900000000;  // phantom seeds that training never draws
+
+std::vector<Organ> organsOf(const BenchmarkOptions& options) {
+  if (!options.data.empty()) {
+    return readOrgans(options.data, kMillimetre, options.exclude, [](const std::string& sentence) {
+      std::cerr << "left out: " << sentence << '\n';
+    });
+  }
+  std::vector<Organ> organs;
+  for (const std::string& name : phantomOrgans()) {
+    for (int i = 0; i < options.phantoms; ++i) {
+      organs.push_back({name, std::to_string(i), makePhantom(name, kUnseenPatients + i)});
+    }
+  }
+  return organs;
+}
+
+/// Turns both clouds together: the problem stays the same, but the network was made for organs as
+/// scanners lay them.
+void turn(RegistrationPair& pair, double degrees, std::uint64_t seed) {
+  const Eigen::Isometry3d rotation(
+      Eigen::AngleAxisd(degrees * M_PI / 180.0, Random(seed).direction()));
+  const Eigen::Matrix3f turned = rotation.linear().cast<float>();
+  for (Points* points : {&pair.source, &pair.source_normals, &pair.target, &pair.truth,
+                         &pair.interior, &pair.interior_truth, &pair.surface}) {
+    *points = turned * *points;
+  }
+  pair.best_rigid = rotation * pair.best_rigid * rotation.inverse();
+  if (pair.viewpoint) pair.viewpoint = turned * *pair.viewpoint;
+}
+
+std::string labelOf(const BenchmarkOptions& options) {
+  if (!options.label.empty()) return options.label;
+  if (options.phantoms > 0) return "phantoms";
+  const std::string& folder = options.cases.empty() ? options.data : options.cases;
+  return std::filesystem::weakly_canonical(folder).filename().string();
+}
+
+std::vector<BenchmarkCase> storedCases(const BenchmarkOptions& options) {
+  std::vector<BenchmarkCase> cases;
+  for (const CaseFolder& folder : listCaseFolders(options.cases)) {
+    const auto& wanted = options.protocols;
+    if (std::find(wanted.begin(), wanted.end(), folder.protocol) == wanted.end()) continue;
+    cases.push_back({labelOf(options), protocolFromString(folder.protocol), folder.organ,
+                     folder.subject, "stored",
+                     [path = folder.path] { return readCaseFolder(path); }});
+  }
+  return cases;
+}
+
+std::vector<BenchmarkCase> madeCases(const BenchmarkOptions& options) {
+  const auto organs = std::make_shared<const std::vector<Organ>>(organsOf(options));
+  const std::string label = labelOf(options);
+  std::vector<BenchmarkCase> cases;
+  for (const std::string& name : options.protocols) {
+    const Protocol protocol = protocolFromString(name);
+    std::uint64_t number = 0;
+    for (const Organ& organ : *organs) {
+      for (int i = 0; i < options.pairs; ++i) {
+        const std::uint64_t seed = options.seed * 1000003ULL + number++;
+        const auto load = [organs, &organ, protocol, seed, points = options.points,
+                           angle = options.common_rotation] {
+          RegistrationPair pair = makePair(organ.surface, protocol, points, seed);
+          if (angle > 0.0) turn(pair, angle, seed);
+          return pair;
+        };
+        cases.push_back({label, protocol, organ.name, organ.subject, std::to_string(seed), load});
+      }
+    }
+  }
+  return cases;
+}
+
+}  // namespace
+
+std::vector<BenchmarkCase> benchmarkCases(const BenchmarkOptions& options) {
+  const std::vector<BenchmarkCase> cases =
+      options.cases.empty() ? madeCases(options) : storedCases(options);
+  if (cases.empty()) throw std::runtime_error("no cases: the folder holds none of the protocols");
+  return cases;
+}
+
+}  // namespace unirit
