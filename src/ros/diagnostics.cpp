@@ -58,6 +58,11 @@ void Diagnostics::noteFault(const std::string& sentence) {
   fault_ = sentence;
 }
 
+void Diagnostics::noteWarning(const std::string& sentence) {
+  const std::lock_guard lock(mutex_);
+  warnings_ += (warnings_.empty() ? "" : "; ") + sentence;
+}
+
 void Diagnostics::update() {
   {
     const std::lock_guard lock(mutex_);
@@ -95,6 +100,7 @@ void Diagnostics::describeRegistration(Status& status) {
     status.add("total [ms]", std::accumulate(result_.stage_milliseconds.begin(),
                                              result_.stage_milliseconds.end(), 0.0));
   }
+  if (!warnings_.empty()) status.mergeSummary(Level::WARN, warnings_);
   if (!fault_.empty()) status.summary(Level::ERROR, fault_);
 }
 

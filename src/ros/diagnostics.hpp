@@ -20,8 +20,9 @@ class Diagnostics {
   void notePreoperative(ros::Time stamp);
   void noteIntraoperative(ros::Time stamp, bool dropped_another);
   void noteResult(const RegistrationResult& result);
-  /// A sentence that holds until the node is restarted.
+  /// Sentences that hold until the node is restarted.
   void noteFault(const std::string& sentence);
+  void noteWarning(const std::string& sentence);
 
   /// Publishes where a second of steady time has gone by since it last did.
   void update();
@@ -37,7 +38,7 @@ class Diagnostics {
   ros::Time preoperative_stamp_, intraoperative_stamp_;
   int clouds_ = 0;   // since the last update
   int dropped_ = 0;  // since the start
-  std::string fault_;
+  std::string fault_, warnings_;
   RegistrationResult result_;  // the last one; id 0: none yet
   Clock::time_point updated_;
   double seconds_since_update_ = 0.0;

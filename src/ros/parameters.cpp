@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "parameters.hpp"
 
+#include <set>
 #include <sstream>
 #include <stdexcept>
 #include <type_traits>
 
+#include "parameter_names.hpp"
 #include "refusal.hpp"
 #include "result_message.hpp"
 
@@ -31,13 +33,20 @@ constexpr const char* nameOfType() {
   return "a string";
 }
 
+/// What libraries that work within the node look for in its namespace.
+const std::set<std::string>& namesOfOthers() {
+  static const std::set<std::string> names{"diagnostic_period", "num_worker_threads", "tf_prefix"};
+  return names;
+}
+
 /// Reads parameters one by one, keeps the default of an absent one and notes faults.
 class Reader {
  public:
-  Reader(const ros::NodeHandle& nh, std::vector<std::string>& faults) : nh_(nh), faults_(faults) {}
+  Reader(const ros::NodeHandle& nh, Parameters& parameters) : nh_(nh), parameters_(parameters) {}
 
   template <class Value>
   void read(const std::string& name, Value& value) {
+    known_.insert(name);
     XmlRpcValue given;
     if (!nh_.getParam(name, given)) return;
     if (std::is_same_v<Value, double> && given.getType() == XmlRpcValue::TypeInt) {
@@ -75,6 +84,7 @@ class Reader {
   }
 
   void readPose(const std::string& name, std::optional<Eigen::Isometry3d>& pose) {
+    known_.insert(name);
     std::vector<double> numbers;
     if (!nh_.hasParam(name)) return;
     const bool is_list = nh_.getParam(name, numbers);
@@ -98,13 +108,35 @@ class Reader {
     }
   }
 
+  /// To be called after all others: what was given beyond them.
+  void noteUnknown() {
+    XmlRpcValue tree;
+    nh_.getParam(nh_.getNamespace(), tree);
+    for (const std::string& name : leafNames(tree)) {
+      if (known_.count(name) > 0 || namesOfOthers().count(name) > 0) continue;
+      const std::string meant = nearestName(name, known_);
+      if (!meant.empty()) {
+        fault(name, "is unknown; the nearest known one is " + meant);
+      } else if (isInNamespaceOf(name, known_)) {
+        fault(name, "is unknown");
+      } else {
+        parameters_.warnings.push_back(sentence(name, "is unknown and has no effect"));
+      }
+    }
+  }
+
  private:
+  std::string sentence(const std::string& name, const std::string& what) const {
+    return "parameter " + nh_.resolveName(name) + " " + what;
+  }
+
   void fault(const std::string& name, const std::string& what) {
-    faults_.push_back("parameter " + nh_.resolveName(name) + " " + what);
+    parameters_.faults.push_back(sentence(name, what));
   }
 
   ros::NodeHandle nh_;
-  std::vector<std::string>& faults_;
+  Parameters& parameters_;
+  std::set<std::string> known_;
 };
 
 void readNodeSettings(Reader& reader, NodeSettings& node) {
@@ -130,7 +162,7 @@ void readNodeSettings(Reader& reader, NodeSettings& node) {
 
 Parameters readParameters(const ros::NodeHandle& private_nh) {
   Parameters parameters;
-  Reader reader(private_nh, parameters.faults);
+  Reader reader(private_nh, parameters);
   auto& registration = parameters.registration;
   visitSettings(registration,
                 [&](const char* name, auto& value, auto minimum, auto maximum, const char*) {
@@ -142,6 +174,7 @@ Parameters readParameters(const ros::NodeHandle& private_nh) {
       "network/pairing", toString(registration.network.pairing),
       [&](const std::string& word) { registration.network.pairing = pairingFromString(word); });
   readNodeSettings(reader, parameters.node);
+  reader.noteUnknown();
   return parameters;
 }
 

@@ -28,13 +28,15 @@ struct NodeSettings {
   double tf_timeout = 0.5;  ///< wait for a transform at a cloud's stamp, at most [s]
 };
 
-/// Parameters as read once at start, and a sentence for each that cannot be used. A node with such
-/// faults stays alive and refuses to register: a limit that was mistyped must not fall back to a
-/// default unseen.
+/// Parameters as read once at start, and a sentence for each that cannot be used. A node with
+/// faults stays alive and refuses to register: a limit that was mistyped, in value or name, must
+/// not fall back to a default unseen. An unknown name that resembles none of the node's, and so may
+/// be somebody else's, is only warned of.
 struct Parameters {
   RegistrationSettings registration;
   NodeSettings node;
   std::vector<std::string> faults;
+  std::vector<std::string> warnings;
 };
 
 Parameters readParameters(const ros::NodeHandle& private_nh);

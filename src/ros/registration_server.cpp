@@ -82,6 +82,10 @@ RegistrationServer::RegistrationServer(const ros::NodeHandle& nh, const ros::Nod
       thresholds_(parameters_.registration.plausibility),
       callbacks_spinner_(1, &callbacks_queue_),
       register_spinner_(1, &register_queue_) {
+  for (const std::string& warning : parameters_.warnings) {
+    ROS_WARN("%s", warning.c_str());
+    diagnostics_.noteWarning(warning);
+  }
   connect();
   callbacks_spinner_.start();
   register_spinner_.start();

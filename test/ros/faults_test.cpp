@@ -16,6 +16,8 @@
 namespace unirit::test {
 namespace {
 
+using Level = diagnostic_msgs::DiagnosticStatus;
+
 /// Levels and sentences of /diagnostics, by name of the status.
 class DiagnosticsListener {
  public:
@@ -28,12 +30,12 @@ class DiagnosticsListener {
         });
   }
 
-  bool waitForError(const std::string& name, const std::string& words) {
+  /// Waits until the status has this level and its sentence holds these words.
+  bool waitFor(const std::string& name, unsigned char level, const std::string& words) {
     std::unique_lock lock(mutex_);
     return received_.wait_for(lock, std::chrono::duration<double>(kDeadline), [&] {
       const auto& status = statuses_[name];
-      return status.level == diagnostic_msgs::DiagnosticStatus::ERROR &&
-             status.message.find(words) != std::string::npos;
+      return status.level == level && status.message.find(words) != std::string::npos;
     });
   }
 
@@ -56,7 +58,7 @@ void expectLivesAndSays(const std::string& node, const std::string& words) {
     EXPECT_EQ(result.id, id);
     EXPECT_NE(result.message.find(words), std::string::npos) << result.message;
   }
-  EXPECT_TRUE(diagnostics.waitForError(node + ": registration", words));
+  EXPECT_TRUE(diagnostics.waitFor(node + ": registration", Level::ERROR, words));
 }
 
 TEST(Faults, missingWeightsAreNamed) { expectLivesAndSays("missing_weights", "/nowhere/at/all"); }
@@ -67,6 +69,13 @@ TEST(Faults, badParametersAreNamed) {
   expectLivesAndSays("bad_parameters", "/bad_parameters/plausibility/max_residual is -1");
   expectLivesAndSays("wrong_type", "/wrong_type/auto_register is not true or false");
   expectLivesAndSays("bad_pose", "/bad_pose/initial_pose is not a list of the 7 numbers");
+}
+
+TEST(Faults, unknownNamesThatResembleTheNodesOwnAreRefused) {
+  expectLivesAndSays("misspelt_limit",
+                     "/misspelt_limit/plausibilty/max_residual is unknown; the nearest known one "
+                     "is plausibility/max_residual");
+  expectLivesAndSays("unknown_limit", "/unknown_limit/plausibility/most_folds is unknown");
 }
 
 TEST(Faults, absentStartIsRefused) {
@@ -96,6 +105,15 @@ void expectRegisters(Client& client) {
   const auto result =
       client.callRegister(requestWith(organCloud(), seenCloud(truePose(), {}))).result;
   EXPECT_EQ(result.status, RegistrationResult::SUCCEEDED) << result.message;
+}
+
+TEST(Faults, unknownNamesOfOthersAreWarnedOfAlone) {
+  Client client("/others_parameters");
+  expectRegisters(client);
+  DiagnosticsListener diagnostics;
+  EXPECT_TRUE(diagnostics.waitFor(
+      "others_parameters: registration", Level::WARN,
+      "parameter /others_parameters/camera/width is unknown and has no effect"));
 }
 
 TEST(Managers, unloadDuringARegistrationEndsItAndNothingElse) {
@@ -129,6 +147,10 @@ TEST(Managers, unloadDuringARegistrationEndsItAndNothingElse) {
   EXPECT_TRUE(call("/first_manager/load_nodelet", load) && load.response.success);
   Client again("/first");
   expectRegisters(again);
+
+  // and finds nothing wrong with what its first life left on the parameter server
+  DiagnosticsListener diagnostics;
+  EXPECT_TRUE(diagnostics.waitFor("first: registration", Level::OK, ""));
 }
 
 }  // namespace

@@ -8,6 +8,8 @@
 #include <set>
 #include <string>
 
+#include "parameter_names.hpp"
+
 namespace unirit {
 namespace {
 
@@ -83,6 +85,36 @@ TEST(Settings, everyThresholdOfTheDynamicParametersArrives) {
     if (name.rfind("plausibility/", 0) != 0) return;
     EXPECT_EQ(value, maximum) << name;
   });
+}
+
+TEST(ParameterNames, thoseOfATreeAreJoinedBySlashes) {
+  XmlRpc::XmlRpcValue tree;
+  tree["stages"] = "rigid";
+  tree["network"]["pairing"] = "none";
+  tree["initial_pose"][0] = 1.0;
+  EXPECT_EQ(leafNames(tree), (std::set<std::string>{"initial_pose", "network/pairing", "stages"}));
+  EXPECT_TRUE(leafNames(XmlRpc::XmlRpcValue()).empty());
+}
+
+TEST(ParameterNames, aMisspeltOneLeadsToTheOneMeant) {
+  const std::set<std::string> known{"plausibility/max_residual", "plausibility/min_points",
+                                    "stages", "tf_rate", "fixed_frame"};
+  EXPECT_EQ(nearestName("plausibilty/max_residual", known), "plausibility/max_residual");
+  EXPECT_EQ(nearestName("plausibility/maxresiduum", known), "plausibility/max_residual");
+  EXPECT_EQ(nearestName("max_residual", known), "plausibility/max_residual");
+  EXPECT_EQ(nearestName("stage", known), "stages");
+  EXPECT_EQ(nearestName("fixed_frame_id", known), "fixed_frame");
+  EXPECT_EQ(nearestName("camera/width", known), "");
+  EXPECT_EQ(nearestName("robot", known), "");
+  EXPECT_EQ(nearestName("stage", {}), "");
+}
+
+TEST(ParameterNames, namespacesOfTheNodeAreItsOwn) {
+  const std::set<std::string> known{"plausibility/max_residual", "stages"};
+  EXPECT_TRUE(isInNamespaceOf("plausibility/limits/lowest", known));
+  EXPECT_TRUE(isInNamespaceOf("plausibility", known));
+  EXPECT_FALSE(isInNamespaceOf("stages/first", known));
+  EXPECT_FALSE(isInNamespaceOf("plaus/max_residual", known));
 }
 
 }  // namespace
