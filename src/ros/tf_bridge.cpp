@@ -3,6 +3,7 @@
 
 #include <tf2_eigen/tf2_eigen.h>
 
+#include <algorithm>
 #include <chrono>
 #include <sstream>
 #include <stdexcept>
@@ -15,25 +16,50 @@ namespace {
 
 constexpr char kAuthority[] = "tf";  // tf2 wants to know who said it, and does nothing with it
 constexpr unsigned kQueueSize = 1000;
+constexpr std::chrono::seconds kSilence{10};  // after it, who published a moving edge has ended
+
+/// Without the leading slash of old, which tf2 drops too.
+std::string bare(const std::string& frame) {
+  return frame.empty() || frame.front() != '/' ? frame : frame.substr(1);
+}
 
 }  // namespace
 
 TfBridge::TfBridge(ros::NodeHandle nh, double history) : buffer_(ros::Duration(history)) {
-  moving_ = nh.subscribe<tf2_msgs::TFMessage>(
-      "/tf", kQueueSize, [this](const auto& message) { onTransforms(message, false); });
-  static_ = nh.subscribe<tf2_msgs::TFMessage>(
-      "/tf_static", kQueueSize, [this](const auto& message) { onTransforms(message, true); });
+  using tf2_msgs::TFMessage;
+  using Callback = boost::function<void(const Event&)>;
+  moving_ = nh.subscribe<TFMessage>(
+      "/tf", kQueueSize, Callback([this](const Event& event) { onTransforms(event, false); }));
+  static_ =
+      nh.subscribe<TFMessage>("/tf_static", kQueueSize,
+                              Callback([this](const Event& event) { onTransforms(event, true); }));
 }
 
-void TfBridge::onTransforms(const tf2_msgs::TFMessageConstPtr& message, bool is_static) {
+void TfBridge::onTransforms(const Event& event, bool is_static) {
   {
     const std::lock_guard lock(mutex_);
-    for (const auto& transform : message->transforms) {
-      if (own_edges_.count({transform.header.frame_id, transform.child_frame_id}) > 0) continue;
+    for (const auto& transform : event.getConstMessage()->transforms) {
+      if (isOwn(transform)) continue;
+      const std::string parent = bare(transform.header.frame_id);
+      const std::string child = bare(transform.child_frame_id);
+      Claim& claim = claims_[child];
+      if (is_static || !claim.is_static) {
+        claim = {parent, event.getPublisherName(), is_static, Clock::now()};
+      }
+      if (own_edges_.count({parent, child}) > 0) continue;
       buffer_.setTransform(transform, kAuthority, is_static);
     }
   }
   arrived_.notify_all();
+}
+
+/// Told by what was sent, not by the publisher's name: nodelets of one manager share theirs. What
+/// was sent before the one heard of now has been lost.
+bool TfBridge::isOwn(const geometry_msgs::TransformStamped& transform) {
+  const auto sent = std::find(sent_.begin(), sent_.end(), transform);
+  if (sent == sent_.end()) return false;
+  sent_.erase(sent_.begin(), sent + 1);
+  return true;
 }
 
 std::string TfBridge::tryLookUp(const std::string& target, const std::string& source,
@@ -77,14 +103,16 @@ void TfBridge::claimEdge(const std::string& parent, const std::string& child) {
                                              "needs a frame of its own");
   }
   const std::lock_guard lock(mutex_);
-  own_edges_.emplace(parent, child);
-  std::string other;
-  if (!buffer_._getParent(child, ros::Time(), other) || own_edges_.count({other, child}) > 0) {
-    return;
-  }
-  throw Refusal(Status::kInvalidInput, "frame '" + child + "' already has parent '" + other +
-                                           "' on /tf, so its edge to '" + parent +
-                                           "' cannot be published");
+  own_edges_.emplace(bare(parent), bare(child));
+  const auto found = claims_.find(bare(child));
+  if (found == claims_.end()) return;
+  const Claim& claim = found->second;
+  if (!claim.is_static && Clock::now() - claim.received > kSilence) return;
+  throw Refusal(Status::kInvalidInput, "frame '" + child + "' already has parent '" + claim.parent +
+                                           "' on /tf, by node '" + claim.publisher +
+                                           "', so its edge to '" + parent +
+                                           "' cannot be published: end that node, or set "
+                                           "publish_tf to false");
 }
 
 void TfBridge::publish(const std::string& parent, const std::string& child,
@@ -100,6 +128,8 @@ void TfBridge::publish(const std::string& parent, const std::string& child,
   const std::lock_guard lock(mutex_);
   if (stamp <= last_published_) return;
   last_published_ = stamp;
+  sent_.push_back(message);
+  if (sent_.size() > kQueueSize) sent_.pop_front();
   broadcaster_.sendTransform(message);
 }
 

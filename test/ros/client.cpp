@@ -102,9 +102,19 @@ RegisterResponse Client::registerUntil(
   do {
     response = callRegister();
     if (wanted(response.result)) return response;
+    ros::WallDuration(0.01).sleep();  // roscpp loses one call in thousands that come at once
   } while (ros::WallTime::now() < end);
   ADD_FAILURE() << "no registration as wanted; the last said: " << response.result.message;
   return response;
+}
+
+RegisterResponse Client::sendAndRegister(const Eigen::Isometry3d& T_camera_organ) {
+  const ros::Time stamp = ros::Time::now();
+  sendCloud(seenCloud(T_camera_organ, stamp));
+  registerUntil([&](const auto& result) {
+    return result.header.stamp == stamp && result.preoperative_frame == kOrganFrame;
+  });
+  return callRegister(requestFrom(T_camera_organ));
 }
 
 bool Client::waitUntil(const std::function<bool()>& condition) {

@@ -39,6 +39,10 @@ class Client {
   /// Calls register until its result is as wanted; messages on topics need time to arrive.
   RegisterResponse registerUntil(const std::function<bool(const RegistrationResult&)>& wanted);
 
+  /// Sends a new cloud of the organ at this pose and registers it, with a start, as soon as it has
+  /// arrived.
+  RegisterResponse sendAndRegister(const Eigen::Isometry3d& T_camera_organ);
+
   /// The first result on the topic that is as wanted, among those already here and to come.
   RegistrationResult waitForResult(const std::function<bool(const RegistrationResult&)>& wanted);
 

@@ -21,7 +21,7 @@ class Node : public testing::Test {
 
   void SetUp() override {
     client().sendOrgan(organCloud());
-    accepted_ = sendAndRegister(truePose());
+    accepted_ = client().sendAndRegister(truePose());
     ASSERT_EQ(accepted_.result.status, RegistrationResult::SUCCEEDED) << accepted_.result.message;
   }
 
@@ -36,16 +36,6 @@ class Node : public testing::Test {
       return client().deformed.data == accepted_.deformed.data && rigid.cols() == expected.cols() &&
              (rigid - expected).cwiseAbs().maxCoeff() < 1e-6F;
     });
-  }
-
-  /// Sends a new cloud and registers it, with a start, as soon as it has arrived.
-  static RegisterResponse sendAndRegister(const Eigen::Isometry3d& pose) {
-    const ros::Time stamp = ros::Time::now();
-    client().sendCloud(seenCloud(pose, stamp));
-    client().registerUntil([&](const auto& result) {
-      return result.header.stamp == stamp && result.preoperative_frame == kOrganFrame;
-    });
-    return client().callRegister(requestFrom(pose));
   }
 
   RegisterResponse accepted_;
