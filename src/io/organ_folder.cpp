@@ -2,33 +2,83 @@
 #include "unirit/io/organ_folder.hpp"
 
 #include <algorithm>
+#include <cctype>
 #include <filesystem>
 #include <stdexcept>
 #include <utility>
 
+#include "unirit/io/organ_names.hpp"
 #include "unirit/io/surface_io.hpp"
 
 namespace unirit {
+namespace {
+
+namespace fs = std::filesystem;
+
+bool isMeshFile(const fs::path& path) {
+  std::string extension = path.extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return std::tolower(c); });
+  constexpr const char* kExtensions[] = {".ply", ".stl", ".obj", ".pcd"};
+  return std::count(std::begin(kExtensions), std::end(kExtensions), extension) > 0;
+}
+
+/// By the folder where that is a known organ, else by the file's name; where that is silent, a
+/// folder below the root counts as it stands.
+OrganGuess organOf(const fs::path& path, const fs::path& root) {
+  const std::string folder = organOfFolder(path.parent_path().filename().string());
+  const bool flat = path.parent_path() == root;
+  if (isOrgan(folder)) return {folder, {}};
+  const OrganGuess guess = organInFileName(path.stem().string());
+  return flat || !guess.organ.empty() || guess.ambiguous ? guess : OrganGuess{folder, {}};
+}
+
+}  // namespace
+
+std::vector<OrganFile> listOrganFiles(const std::string& folder,
+                                      const std::function<void(const std::string&)>& left_out) {
+  const fs::path root = fs::path(folder).lexically_normal();
+  if (!fs::is_directory(root)) throw std::runtime_error(folder + ": not a folder");
+  std::vector<fs::path> paths;
+  for (const auto& entry : fs::recursive_directory_iterator(root)) {
+    const bool hidden = entry.path().filename().string().front() == '.';
+    if (entry.is_regular_file() && !hidden) paths.push_back(entry.path());
+  }
+  std::sort(paths.begin(), paths.end());
+
+  // "organs/" and "organs" are the same folder
+  const fs::path parent = root.has_filename() ? root : root.parent_path();
+  std::vector<OrganFile> files;
+  for (const fs::path& path : paths) {
+    if (!isMeshFile(path)) {
+      left_out(path.string() + ": its extension is none of .ply, .pcd, .stl, .obj");
+      continue;
+    }
+    const OrganGuess guess = organOf(path, parent);
+    if (guess.organ.empty()) {
+      left_out(path.string() + ": its name " + guess.problem);
+      continue;
+    }
+    files.push_back({guess.organ, path.stem().string(), path.string(),
+                     path.lexically_relative(parent).string()});
+  }
+  return files;
+}
+
+Surface readOrganSurface(const OrganFile& file, double unit) {
+  Surface surface = readSurface(file.path, unit).surface;
+  if (surface.faces.cols() == 0) throw std::runtime_error(file.path + ": has no faces");
+  return surface;
+}
 
 std::vector<Organ> readOrgans(const std::string& folder, double unit,
                               const std::vector<std::string>& exclude,
                               const std::function<void(const std::string&)>& left_out) {
-  namespace fs = std::filesystem;
-  if (!fs::is_directory(folder)) throw std::runtime_error(folder + ": not a folder");
-  std::vector<fs::path> paths;
-  for (const auto& entry : fs::recursive_directory_iterator(folder)) {
-    if (entry.is_regular_file()) paths.push_back(entry.path());
-  }
-  std::sort(paths.begin(), paths.end());
-
   std::vector<Organ> organs;
-  for (const fs::path& path : paths) {
-    const std::string name = path.parent_path().filename();
-    if (std::count(exclude.begin(), exclude.end(), name) > 0) continue;
+  for (const OrganFile& file : listOrganFiles(folder, left_out)) {
+    if (std::count(exclude.begin(), exclude.end(), file.organ) > 0) continue;
     try {
-      Surface surface = readSurface(path, unit).surface;
-      if (surface.faces.cols() == 0) throw std::runtime_error(path.string() + ": has no faces");
-      organs.push_back({name, path.stem(), std::move(surface)});
+      organs.push_back({file.organ, file.subject, readOrganSurface(file, unit)});
     } catch (const std::runtime_error& error) {
       left_out(error.what());
     }

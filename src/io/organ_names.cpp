@@ -144,14 +144,21 @@ OrganGuess organInFileName(const std::string& stem) {
   }
   if (organs.empty()) return {{}, "names no organ of the table"};
   if (organs.size() > 1) {
-    return {{}, "is ambiguous: it names both " + *organs.begin() + " and " + *organs.rbegin()};
+    return {
+        {}, "is ambiguous: it names both " + *organs.begin() + " and " + *organs.rbegin(), true};
   }
   if (!part.empty()) {
     return {{},
             "is ambiguous: it names " + *organs.begin() + " and " + part +
-                ", which may be the organ or a part of it"};
+                ", which may be the organ or a part of it",
+            true};
   }
   return {*organs.begin(), {}};
+}
+
+bool isOrgan(const std::string& name) {
+  return std::any_of(std::begin(kSynonyms), std::end(kSynonyms),
+                     [&](const Synonym& synonym) { return synonym.organ == name; });
 }
 
 std::string organOfFolder(const std::string& name) {

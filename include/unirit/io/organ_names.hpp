@@ -9,8 +9,9 @@ namespace unirit {
 /// What a file's name says of the organ in it: an organ's class, or a clause that says why none
 /// can be told.
 struct OrganGuess {
-  std::string organ;    ///< class such as "small_bowel", or empty
-  std::string problem;  ///< such as "names both liver and spleen", or empty
+  std::string organ;       ///< class such as "small_bowel", or empty
+  std::string problem;     ///< such as "names no organ of the table", or empty
+  bool ambiguous = false;  ///< it names more than one thing
 };
 
 /// The organ that a file name without extension names somewhere, in any case, by one of the
@@ -18,6 +19,9 @@ struct OrganGuess {
 /// "GallBladder_7". Ambiguous are names of two organs, and those of an organ beside a word for a
 /// part of it or what grows in it ("liver_vessel").
 OrganGuess organInFileName(const std::string& stem);
+
+/// Whether the table has a class of this very name.
+bool isOrgan(const std::string& name);
 
 /// The class whose synonym the folder's whole name is ("Small_Intestine"), else the name itself.
 std::string organOfFolder(const std::string& name);
