@@ -8,7 +8,7 @@
 namespace unirit {
 namespace {
 
-constexpr double kTolerance = 1e-10;
+constexpr double kTolerance = 1e-7;
 
 Eigen::ArrayXd kernel(const Eigen::Matrix3Xd& points, const Eigen::Vector3d& centre, double width) {
   return ((points.colwise() - centre).colwise().squaredNorm() / (-2.0 * width * width))
