@@ -25,6 +25,8 @@ refuse() {
 }
 
 checkOrgan() {
+  [[ $organ == "" ]] || refuse "$1: one organ at a time, and $organ is one"
+  [[ ! -d $1 ]] || refuse "$1: a folder, not a file"
   [[ -f $1 && -r $1 ]] || refuse "$1: no such file, or not readable"
   case ${1,,} in
     *.ply | *.stl | *.obj | *.pcd) ;;
@@ -34,9 +36,11 @@ checkOrgan() {
 
 checkNumber() {
   [[ $2 =~ ^[0-9]{1,9}$ ]] || refuse "$1 $2: not a whole number"
+  [[ $1 != --registrations || $2 =~ [1-9] ]] || refuse "$1 $2: the demo needs one at least"
 }
 
 rviz=true
+organ=
 arguments=()
 while (($# > 0)); do
   case $1 in
@@ -54,7 +58,8 @@ while (($# > 0)); do
     -*) refuse "unknown option $1; --help lists those that exist" ;;
     *)
       checkOrgan "$1"
-      arguments+=("organ:=$(realpath "$1")")
+      organ=$1
+      arguments+=("organ:=$(realpath "$organ")")
       ;;
   esac
   shift

@@ -11,6 +11,8 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <sstream>
+#include <stdexcept>
 
 #include "conversions.hpp"
 #include "demo_report.hpp"
@@ -18,6 +20,7 @@
 #include "names.hpp"
 #include "unirit/io/surface_io.hpp"
 #include "unirit/metrics.hpp"
+#include "unirit/point_cloud.hpp"
 #include "unirit/simulation/phantom.hpp"
 
 namespace unirit {
@@ -26,7 +29,8 @@ namespace {
 constexpr char kWorldFrame[] = "world";
 constexpr char kCameraFrame[] = "camera_optical";
 constexpr char kPreoperativeFrame[] = "preoperative";
-constexpr double kMillimetre = 0.001;  // unit of organ files [m]
+constexpr double kMillimetre = 0.001;                          // unit of organ files [m]
+constexpr double kSmallestOrgan = 0.005, kLargestOrgan = 2.0;  // extent [m]
 
 SceneSettings readSceneSettings(const ros::NodeHandle& nh) {
   SceneSettings scene;
@@ -48,9 +52,19 @@ SceneSettings readSceneSettings(const ros::NodeHandle& nh) {
   return scene;
 }
 
+Surface readOrgan(const std::string& file) {
+  const Surface organ = readSurface(file, kMillimetre).surface;
+  const double size = extent(organ.vertices.points);
+  if (size >= kSmallestOrgan && size <= kLargestOrgan) return organ;
+  std::ostringstream sentence;
+  sentence << file << " holds an organ of " << size / kMillimetre
+           << " mm: is it in another unit than millimetres?";
+  throw std::runtime_error(sentence.str());
+}
+
 Surface loadOrgan(const ros::NodeHandle& nh) {
   const std::string file = nh.param<std::string>("organ", "");
-  if (!file.empty()) return readSurface(file, kMillimetre).surface;
+  if (!file.empty()) return readOrgan(file);
   return makePhantom(nh.param<std::string>("phantom", "liver"),
                      static_cast<std::uint64_t>(nh.param("seed", 1)));
 }

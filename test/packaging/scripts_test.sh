@@ -40,7 +40,8 @@ passesForeignPythonBy() {
   [[ $found == /usr/bin/python3 ]]
 }
 
-touch organ.txt
+touch organ.txt first.ply
+mkdir folder.ply
 claim "--help shows the usage" helps
 claim "an unknown option is refused" \
   refuses "unknown option --fast; --help lists those that exist" --fast
@@ -52,6 +53,12 @@ claim "an option without its value is refused" \
   refuses "--registrations needs a value" --registrations
 claim "a count that is no number is refused" \
   refuses "--registrations many: not a whole number" --registrations many
+claim "no registration at all is refused" \
+  refuses "--registrations 0: the demo needs one at least" --registrations 0
+claim "a folder in place of an organ is refused" \
+  refuses "folder.ply: a folder, not a file" folder.ply
+claim "two organs are refused" \
+  refuses "second.ply: one organ at a time, and first.ply is one" first.ply second.ply
 claim "a foreign python ahead in PATH is passed by" passesForeignPythonBy
 claim "a set-up that has been done has nothing to say" setsUpSilently
 claim "a missing package is noticed" noticesMissingPackage
