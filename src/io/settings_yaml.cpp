@@ -12,10 +12,10 @@ namespace {
 
 /// What config/unirit.yaml tells the node, not the registration.
 bool belongsToNode(const std::string& key) {
-  static const std::set<std::string> keys{
-      "auto_register", "every_cloud",        "fixed_frame", "initial_alignment", "initial_pose",
-      "invert_tf",     "max_cloud_age",      "pairing",     "publish_rate",      "publish_tf",
-      "stale_after",   "preoperative_frame", "tf_rate",     "tf_timeout",        "weights"};
+  static const std::set<std::string> keys{"auto_register",     "every_cloud",  "fixed_frame",
+                                          "initial_alignment", "initial_pose", "invert_tf",
+                                          "publish_tf",        "stale_after",  "tf_rate",
+                                          "tf_timeout",        "weights"};
   return keys.count(key) > 0;
 }
 
@@ -56,11 +56,11 @@ void parse(const std::string& path, RegistrationSettings& settings) {
     const bool is_whole = std::is_same_v<std::decay_t<decltype(value)>, int>;
     take(key, is_whole ? "a whole number" : "a number", values, value);
   });
-  std::string stages = toString(settings.stages), pairing = toString(settings.network.pairing);
-  take("stages", "a word", values, stages);
-  take("network/pairing", "a word", values, pairing);
-  settings.stages = stagesFromString(stages);
-  settings.network.pairing = pairingFromString(pairing);
+  for (const WordSetting& word : wordSettings()) {
+    std::string value = word.get(settings);
+    take(word.name, "a word", values, value);
+    word.set(settings, value);
+  }
   validate(settings);
   for (const auto& [key, value] : values) {
     if (!belongsToNode(key)) throw std::runtime_error(key + " is not a setting");

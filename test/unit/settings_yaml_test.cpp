@@ -68,6 +68,7 @@ TEST_F(SettingsYaml, ReadsTheNodesOwnFile) {
 
 TEST_F(SettingsYaml, NamesTheKeyThatIsWrong) {
   expectRefusal("thread: 3\n", "thread is not a setting");
+  expectRefusal("publish_rate: 3\n", "publish_rate is not a setting");
   expectRefusal("plausibility: {min_point: 3}\n", "plausibility/min_point is not a setting");
   expectRefusal("threads: many\n", "threads is not a whole number");
   expectRefusal("threads: 2.5\n", "threads is not a whole number");
