@@ -6,6 +6,9 @@
 #include <stdexcept>
 #include <utility>
 
+#include "refinement/coherent_field.hpp"
+#include "refinement/refinement.hpp"
+#include "unirit/normals.hpp"
 #include "unirit/plausibility.hpp"
 #include "unirit/sampling.hpp"
 
@@ -19,7 +22,16 @@ PointCloud dropInvalid(const PointCloud& cloud) {
   }
   if (static_cast<Eigen::Index>(valid.size()) == cloud.size()) return cloud;
   return {select(cloud.points, valid),
-          cloud.normals.cols() == 0 ? Points() : select(cloud.normals, valid)};
+          cloud.normals.cols() == 0 ? Points() : select(cloud.normals, valid), cloud.viewpoint};
+}
+
+/// The cloud's own normals, or estimated ones turned outwards.
+Points outwardNormals(const PointCloud& cloud, const std::vector<Eigen::Index>& samples) {
+  if (cloud.normals.cols() > 0) return select(cloud.normals, samples);
+  const Points points = select(cloud.points, samples);
+  Points normals = estimateNormals(points);
+  orientOutwards(points, normals);
+  return normals;
 }
 
 /// Runs a stage and notes how long it took.
@@ -51,94 +63,159 @@ bool contains(const std::vector<Stage>& stages, Stage wanted) {
 struct Registrar::Implementation {
   /// The organ, sampled and normalised: what does not change from one view to the next.
   struct Model {
-    PointCloud cloud;  // as given
-    Points sampled;    // 3 x N, the network's unit
-    Points vertices;   // every point, the network's unit
+    PointCloud cloud;    // as given
+    PointCloud sampled;  // N points with normals, the network's unit
+    Points vertices;     // every point, the network's unit
     Normalisation normalisation;
     double extent = 0.0;  // [m]
+    std::unique_ptr<Refinement> refinement;
   };
 
   Implementation(std::shared_ptr<const Weights> new_weights,
                  const RegistrationSettings& new_settings)
       : weights(std::move(new_weights)),
         settings(new_settings),
-        network(weights, settings.network, settings.threads) {}
+        network(weights, settings.network, settings.threads),
+        team(settings.threads) {}
 
   void prepare(const PointCloud& preoperative) {
     if (model && model->cloud.points.cols() == preoperative.points.cols() &&
         model->cloud.points == preoperative.points) {
       return;
     }
-    Model fresh;
-    fresh.cloud = preoperative;
-    fresh.extent = unirit::extent(preoperative.points);
-    fresh.sampled =
-        select(preoperative.points, sampleEvenly(preoperative.points, settings.sampling.points));
-    fresh.normalisation = Normalisation::of(fresh.sampled);
-    fresh.sampled = fresh.normalisation.apply(fresh.sampled);
-    fresh.vertices = fresh.normalisation.apply(preoperative.points);
-    model = std::make_unique<Model>(std::move(fresh));
+    auto fresh = std::make_unique<Model>();
+    fresh->cloud = preoperative;
+    fresh->extent = unirit::extent(preoperative.points);
+    const auto samples = sampleEvenly(preoperative.points, settings.sampling.points);
+    const Points sampled = select(preoperative.points, samples);
+    fresh->normalisation = Normalisation::of(sampled);
+    fresh->sampled = {fresh->normalisation.apply(sampled), outwardNormals(preoperative, samples)};
+    fresh->vertices = fresh->normalisation.apply(preoperative.points);
+    if (contains(settings.stages, Stage::kRefine)) {
+      fresh->refinement =
+          std::make_unique<Refinement>(fresh->sampled, settings.refinement, selectKernels(), team);
+    }
+    model = std::move(fresh);
   }
 
   Registration run(const PointCloud& preoperative, const PointCloud& intraoperative,
                    const Eigen::Isometry3d& guess);
 
+  PointCloud sample(const PointCloud& cloud, const Eigen::Isometry3d& T_organ_cloud) const;
+  Refined refine(const PointCloud& target, const Eigen::Isometry3f& rigid,
+                 const Points& displacements);
+  Eigen::Isometry3d toMetres(const Eigen::Isometry3f& pose) const;
+  std::shared_ptr<const Deformation> deformationOf(const PointCloud& preoperative,
+                                                   const Eigen::Isometry3d& pose,
+                                                   const Points& displacements,
+                                                   const Eigen::Matrix3f& turn,
+                                                   const std::optional<Refined>& refined) const;
+
   std::shared_ptr<const Weights> weights;
   RegistrationSettings settings;
   Network network;
+  ThreadTeam team;  // the refinement's
   std::unique_ptr<Model> model;
 };
 
-/// The paper's figure: sample, normalise, move rigidly, displace, map back to metres.
+/// The paper's figure: sample, normalise, move rigidly, displace, map back to metres; in between
+/// the refinement.
 Registration Registrar::Implementation::run(const PointCloud& preoperative,
                                             const PointCloud& intraoperative,
                                             const Eigen::Isometry3d& guess) {
   Registration registration = ended(Status::kSucceeded, "registered");
   auto& stages = registration.stages;
+  const bool refines = contains(settings.stages, Stage::kRefine);
 
   // Bring the seen cloud to the organ's frame, sample both
-  Points target;
+  PointCloud target;
   timed("sampling", stages, [&] {
     prepare(preoperative);
-    const Points seen = (guess.inverse() * intraoperative.points.cast<double>()).cast<float>();
-    target = select(seen, sampleEvenly(seen, settings.sampling.points));
-    target = model->normalisation.apply(target);
+    target = sample(intraoperative, guess.inverse());
   });
 
   // Rigid module
   Eigen::Isometry3f rigid = Eigen::Isometry3f::Identity();
   if (contains(settings.stages, Stage::kRigid)) {
-    timed("rigid", stages, [&] { rigid = network.estimateRigid(model->sampled, target); });
+    timed("rigid", stages,
+          [&] { rigid = network.estimateRigid(model->sampled.points, target.points); });
   }
 
-  // Non-rigid module, decoded at every point of the organ
-  Points displacements = Points::Zero(3, preoperative.size());
+  // Non-rigid module, decoded at every point of the organ or where the refinement starts from
+  const Points& queries = refines ? model->sampled.points : model->vertices;
+  Points displacements = Points::Zero(3, queries.cols());
   if (contains(settings.stages, Stage::kNonRigid)) {
     timed("nonrigid", stages, [&] {
-      displacements =
-          network.estimateDisplacements(rigid * model->sampled, target, rigid * model->vertices);
+      displacements = network.estimateDisplacements(rigid * model->sampled.points, target.points,
+                                                    rigid * queries);
     });
   }
 
-  // Back to metres and to the seen cloud's frame
+  std::optional<Refined> refined;
+  if (refines) {
+    timed("refine", stages, [&] { refined = refine(target, rigid, displacements); });
+    rigid = rigid * refined->pose;
+  }
+
   timed("assessment", stages, [&] {
-    const auto scale = static_cast<double>(model->normalisation.scale);
-    const Eigen::Vector3d offset = model->normalisation.offset.cast<double>();
-    Eigen::Isometry3d moved = rigid.cast<double>();
-    moved.linear() = Eigen::Quaterniond(moved.linear()).normalized().toRotationMatrix();
-    moved.translation() = scale * moved.translation() + offset - moved.linear() * offset;
-    registration.T_intraoperative_preoperative = guess * moved;
-    displacements = guess.linear().cast<float>() * displacements * model->normalisation.scale;
-    registration.deformation = std::make_shared<const Deformation>(
-        registration.T_intraoperative_preoperative, preoperative.points, displacements);
+    registration.T_intraoperative_preoperative = guess * toMetres(rigid);
+    registration.deformation =
+        deformationOf(preoperative, registration.T_intraoperative_preoperative, displacements,
+                      guess.linear().cast<float>(), refined);
     registration.residual =
         surfaceResidual(registration.deformation->movedSurface(), intraoperative.points,
                         settings.plausibility.inlier_tolerance);
-    registration.displacement = displacementStatistics(
-        registration.deformation->moveRigidly(preoperative.points), displacements);
+    registration.displacement =
+        displacementStatistics(registration.deformation->moveRigidly(preoperative.points),
+                               registration.deformation->displacements());
   });
   applyChecks(checkOutput(registration, model->extent, settings.plausibility), registration);
   return registration;
+}
+
+/// The seen cloud in the network's unit and, where its viewpoint is known, that too.
+PointCloud Registrar::Implementation::sample(const PointCloud& cloud,
+                                             const Eigen::Isometry3d& T_organ_cloud) const {
+  const auto toNetwork = [&](const Points& points) {
+    return model->normalisation.apply((T_organ_cloud * points.cast<double>()).cast<float>());
+  };
+  PointCloud sampled{
+      toNetwork(select(cloud.points, sampleEvenly(cloud.points, settings.sampling.points))), {}};
+  if (cloud.viewpoint) sampled.viewpoint = toNetwork(*cloud.viewpoint);
+  return sampled;
+}
+
+/// Starts from where the network left the organ.
+Refined Registrar::Implementation::refine(const PointCloud& target, const Eigen::Isometry3f& rigid,
+                                          const Points& displacements) {
+  const Eigen::Isometry3f to_start = rigid.inverse();
+  PointCloud seen{to_start * target.points, {}};
+  if (target.viewpoint) seen.viewpoint = to_start * *target.viewpoint;
+  return model->refinement->refine(seen, to_start.linear() * displacements);
+}
+
+Eigen::Isometry3d Registrar::Implementation::toMetres(const Eigen::Isometry3f& pose) const {
+  const auto scale = static_cast<double>(model->normalisation.scale);
+  const Eigen::Vector3d offset = model->normalisation.offset.cast<double>();
+  Eigen::Isometry3d moved = pose.cast<double>();
+  moved.linear() = Eigen::Quaterniond(moved.linear()).normalized().toRotationMatrix();
+  moved.translation() = scale * moved.translation() + offset - moved.linear() * offset;
+  return moved;
+}
+
+/// `displacements`: of every point of the organ, in the network's unit, where nothing was refined.
+std::shared_ptr<const Deformation> Registrar::Implementation::deformationOf(
+    const PointCloud& preoperative, const Eigen::Isometry3d& pose, const Points& displacements,
+    const Eigen::Matrix3f& turn, const std::optional<Refined>& refined) const {
+  if (refined) {
+    return std::make_shared<const Deformation>(
+        pose, preoperative.points,
+        std::make_shared<const CoherentField>(model->refinement->prior(), model->normalisation,
+                                              pose.linear().cast<float>(), refined->coefficients,
+                                              refined->covariance_factor));
+  }
+  return std::make_shared<const Deformation>(pose, preoperative.points,
+                                             turn * displacements * model->normalisation.scale);
 }
 
 Registrar::Registrar(std::shared_ptr<const Weights> weights, const RegistrationSettings& settings) {

@@ -11,14 +11,15 @@
 namespace unirit {
 namespace {
 
-constexpr std::array<Stage, 2> kStages{Stage::kRigid, Stage::kNonRigid};
+constexpr std::array<Stage, 3> kStages{Stage::kRigid, Stage::kNonRigid, Stage::kRefine};
 constexpr std::array<Pairing, 3> kPairings{Pairing::kNearest, Pairing::kNone, Pairing::kRow};
 
 Stage stageFromString(const std::string& name) {
   for (const Stage stage : kStages) {
     if (name == toString(stage)) return stage;
   }
-  throw std::invalid_argument("stages: unknown stage '" + name + "', known are rigid, nonrigid");
+  throw std::invalid_argument("stages: unknown stage '" + name +
+                              "', known are rigid, nonrigid, refine");
 }
 
 }  // namespace
@@ -35,7 +36,21 @@ const char* toString(Pairing pairing) {
   return "unknown";
 }
 
-const char* toString(Stage stage) { return stage == Stage::kRigid ? "rigid" : "nonrigid"; }
+const char* toString(Correspondence correspondence) {
+  return correspondence == Correspondence::kSurface ? "surface" : "points";
+}
+
+const char* toString(Stage stage) {
+  switch (stage) {
+    case Stage::kRigid:
+      return "rigid";
+    case Stage::kNonRigid:
+      return "nonrigid";
+    case Stage::kRefine:
+      return "refine";
+  }
+  return "unknown";
+}
 
 std::string toString(const std::vector<Stage>& stages) {
   std::string names;
@@ -52,6 +67,14 @@ Pairing pairingFromString(const std::string& name) {
                               "', known are nearest, none, row");
 }
 
+Correspondence correspondenceFromString(const std::string& name) {
+  for (const auto correspondence : {Correspondence::kSurface, Correspondence::kPoints}) {
+    if (name == toString(correspondence)) return correspondence;
+  }
+  throw std::invalid_argument("correspondence: unknown correspondence '" + name +
+                              "', known are surface, points");
+}
+
 std::vector<Stage> stagesFromString(const std::string& comma_separated) {
   std::vector<Stage> stages;
   std::istringstream words(comma_separated);
@@ -62,8 +85,26 @@ std::vector<Stage> stagesFromString(const std::string& comma_separated) {
     }
     stages.push_back(stage);
   }
-  if (stages.empty()) throw std::invalid_argument("stages: none given, known are rigid, nonrigid");
+  if (stages.empty())
+    throw std::invalid_argument("stages: none given, known are rigid, nonrigid, refine");
   return stages;
+}
+
+const std::vector<WordSetting>& wordSettings() {
+  using Settings = RegistrationSettings;
+  using Word = const std::string&;
+  static const std::vector<WordSetting> words{
+      {"stages", [](const Settings& s) { return toString(s.stages); },
+       [](Settings& s, Word word) { s.stages = stagesFromString(word); }},
+      {"network/pairing",
+       [](const Settings& s) { return std::string(toString(s.network.pairing)); },
+       [](Settings& s, Word word) { s.network.pairing = pairingFromString(word); }},
+      {"refinement/correspondence",
+       [](const Settings& s) { return std::string(toString(s.refinement.correspondence)); },
+       [](Settings& s, Word word) {
+         s.refinement.correspondence = correspondenceFromString(word);
+       }}};
+  return words;
 }
 
 void validate(const RegistrationSettings& settings) {
@@ -79,8 +120,7 @@ void validate(const RegistrationSettings& settings) {
 
 std::string toJson(const RegistrationSettings& settings) {
   nlohmann::json json;
-  json["stages"] = toString(settings.stages);
-  json["network/pairing"] = toString(settings.network.pairing);
+  for (const WordSetting& word : wordSettings()) json[word.name] = word.get(settings);
   visitSettings(settings,
                 [&](const char* name, auto value, auto, auto, const char*) { json[name] = value; });
   return json.dump();

@@ -8,35 +8,54 @@
 
 namespace unirit {
 
+/// Displacement at any point of the organ, its inside included. Immutable.
+class DisplacementField {
+ public:
+  virtual ~DisplacementField() = default;
+
+  /// Of points of the pre-operative frame, 3 x Q: what is added after the rigid transform, in the
+  /// intra-operative frame [m].
+  virtual Points displacements(const Points& preoperative) const = 0;
+
+  /// How much has been learnt of each point's displacement, a row of Q in [0, 1]: one minus its
+  /// variance over the variance before anything was seen. Empty where the field cannot tell.
+  virtual Eigen::RowVectorXf confidence(const Points& preoperative) const = 0;
+};
+
 /// Takes points of the pre-operative frame to the intra-operative one: the rigid transform, then a
-/// displacement known at the organ's surface points. Immutable, so safe to read from any thread.
+/// displacement. Immutable, so safe to read from any thread.
 class Deformation {
  public:
   /// `surface`: 3 x N pre-operative points [m]; `displacements`: 3 x N, added after the rigid
-  /// transform, in the intra-operative frame [m]. Throws std::invalid_argument where sizes differ.
+  /// transform, in the intra-operative frame [m]. Any other point gets the inverse-distance mean of
+  /// its 8 nearest surface points' displacements. Throws std::invalid_argument where sizes differ.
   Deformation(const Eigen::Isometry3d& T_intraoperative_preoperative, Points surface,
               Points displacements);
-  ~Deformation();
+
+  /// The same with a field of displacements. Throws std::invalid_argument where there is none.
+  Deformation(const Eigen::Isometry3d& T_intraoperative_preoperative, Points surface,
+              std::shared_ptr<const DisplacementField> field);
 
   /// The surface points, moved by the whole registration; same order.
   Points movedSurface() const;
 
-  /// Any points of the pre-operative frame, moved. A surface point gets its own displacement, any
-  /// other the inverse-distance mean of its 8 nearest surface points'.
+  /// Any points of the pre-operative frame, moved.
   Points move(const Points& preoperative) const;
 
   /// Any points of the pre-operative frame, moved by the rigid part alone.
   Points moveRigidly(const Points& preoperative) const;
 
+  /// DisplacementField::confidence.
+  Eigen::RowVectorXf confidence(const Points& preoperative) const;
+
   const Eigen::Isometry3d& rigidTransform() const { return T_intraoperative_preoperative_; }
   const Points& displacements() const { return displacements_; }
 
  private:
-  struct Index;  // k-d tree over the surface points
   Eigen::Isometry3d T_intraoperative_preoperative_;
   Points surface_;
+  std::shared_ptr<const DisplacementField> field_;
   Points displacements_;
-  std::unique_ptr<const Index> index_;
 };
 
 }  // namespace unirit

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <optional>
 
 namespace unirit {
 
@@ -12,6 +13,7 @@ using Points = Eigen::Matrix3Xf;
 struct PointCloud {
   Points points;   ///< 3 x N [m]
   Points normals;  ///< 3 x N unit vectors, or empty where unknown
+  std::optional<Eigen::Vector3f> viewpoint = std::nullopt;  ///< where the sensor stood, if known
 
   Eigen::Index size() const { return points.cols(); }
 };

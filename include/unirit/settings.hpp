@@ -14,7 +14,13 @@ enum class Pairing {
 };
 
 /// The stages of a registration, in their order.
-enum class Stage { kRigid, kNonRigid };
+enum class Stage { kRigid, kNonRigid, kRefine };
+
+/// What a point of the intra-operative cloud is.
+enum class Correspondence {
+  kSurface,  ///< anywhere on the organ's surface
+  kPoints,   ///< one of the pre-operative points, moved: tracked vertices, fiducials
+};
 
 /// How the clouds are brought to the network.
 struct SamplingSettings {
@@ -25,6 +31,15 @@ struct SamplingSettings {
 struct NetworkSettings {
   int rigid_iterations = 8;             ///< n of the paper's rigid module
   Pairing pairing = Pairing::kNearest;  ///< must be the one the weights were trained with
+};
+
+/// The coherent refinement. Lengths scale with the organ.
+struct RefinementSettings {
+  Correspondence correspondence = Correspondence::kSurface;
+  int pose_iterations = 12;  ///< of the pose alone, where the whole surface is seen
+  int iterations = 24;       ///< of pose and displacement
+  double last_sigma = 0.02;  ///< deviation of the cloud from the surface at the end, over the
+                             ///< organ's half extent
 };
 
 /// Limits outside of which a registration is refused. Lengths relative to the organ's extent hold
@@ -43,18 +58,31 @@ struct PlausibilitySettings {
 
 /// Everything the core can be told.
 struct RegistrationSettings {
-  std::vector<Stage> stages{Stage::kRigid, Stage::kNonRigid};
+  std::vector<Stage> stages{Stage::kRigid, Stage::kNonRigid, Stage::kRefine};
   SamplingSettings sampling;
   NetworkSettings network;
+  RefinementSettings refinement;
   PlausibilitySettings plausibility;
   int threads = 2;  ///< worker threads of the network; the result has the same bits for any number
 };
 
 const char* toString(Pairing pairing);
+const char* toString(Correspondence correspondence);
 const char* toString(Stage stage);
+
+/// A setting that is a word, or several.
+struct WordSetting {
+  const char* name;  ///< as in YAML files and ROS parameters
+  std::string (*get)(const RegistrationSettings&);
+  void (*set)(RegistrationSettings&, const std::string&);  ///< throws std::invalid_argument
+};
+
+/// All of them; visitSettings has the numbers.
+const std::vector<WordSetting>& wordSettings();
 
 /// Parse the names that toString gives. Throw std::invalid_argument naming the unknown word.
 Pairing pairingFromString(const std::string& name);
+Correspondence correspondenceFromString(const std::string& name);
 std::vector<Stage> stagesFromString(const std::string& comma_separated);
 std::string toString(const std::vector<Stage>& stages);
 
@@ -67,6 +95,12 @@ void visitSettings(Settings& settings, Visitor&& visitor) {
   visitor("sampling/points", settings.sampling.points, 64, 16384, "points kept of each cloud");
   visitor("network/rigid_iterations", settings.network.rigid_iterations, 1, 32,
           "iterations of the rigid module");
+  auto& r = settings.refinement;
+  visitor("refinement/pose_iterations", r.pose_iterations, 0, 100,
+          "iterations of the pose alone, where the whole surface is seen");
+  visitor("refinement/iterations", r.iterations, 1, 200, "iterations of pose and displacement");
+  visitor("refinement/last_sigma", r.last_sigma, 0.002, 0.1,
+          "deviation of the cloud from the surface at the end, over the organ's half extent");
   visitor("plausibility/min_points", p.min_points, 4, 100000, "fewest points in either cloud");
   visitor("plausibility/min_thickness", p.min_thickness, 0.0, 1.0,
           "second and third principal deviation over the first, at least");

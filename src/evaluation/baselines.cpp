@@ -48,7 +48,8 @@ std::string Unirit::parameters() const {
 }
 
 MethodResult Unirit::registerPair(const RegistrationPair& pair) {
-  const PointCloud source{pair.source, pair.source_normals}, target{pair.target, Points()};
+  const PointCloud source{pair.source, pair.source_normals};
+  const PointCloud target{pair.target, Points(), pair.viewpoint};
   const Eigen::Isometry3d start =
       align_centroids_ ? alignCentroids(source, target) : Eigen::Isometry3d::Identity();
   const Registration registration = registrar_.registerClouds(source, target, start);

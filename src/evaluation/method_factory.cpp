@@ -47,12 +47,25 @@ bool takeStart(Values& values) {
   throw std::invalid_argument("start: '" + start + "' is neither identity nor centroids");
 }
 
+/// Every setting can be given by its name; the stages are joined by "+".
 std::unique_ptr<RegistrationMethod> makeUnirit(std::shared_ptr<const Weights> weights,
-                                               Values& values) {
+                                               Values& values, Protocol protocol) {
   RegistrationSettings settings;
-  std::string stages = takeText(values, "stages", "");
-  std::replace(stages.begin(), stages.end(), '+', ',');
-  if (!stages.empty()) settings.stages = stagesFromString(stages);
+  if (protocol == Protocol::kPaired || protocol == Protocol::kPermuted) {
+    settings.refinement.correspondence = Correspondence::kPoints;
+  }
+  for (const WordSetting& word : wordSettings()) {
+    std::string value = takeText(values, word.name, word.get(settings));
+    std::replace(value.begin(), value.end(), '+', ',');
+    word.set(settings, value);
+  }
+  visitSettings(settings, [&](const char* name, auto& value, auto, auto, const char*) {
+    std::istringstream text(takeText(values, name, ""));
+    if (text.str().empty()) return;
+    if (!(text >> value) || text.peek() != std::istringstream::traits_type::eof()) {
+      throw std::invalid_argument(std::string(name) + ": '" + text.str() + "' is no value for it");
+    }
+  });
   return std::make_unique<Unirit>(std::move(weights), settings, takeStart(values));
 }
 
@@ -88,8 +101,9 @@ std::unique_ptr<RegistrationMethod> MethodFactory::make(const std::string& descr
   Values values;
   const std::string name = parse(description, values);
   std::unique_ptr<RegistrationMethod> method =
-      name == "unirit" ? makeUnirit(weights(takeText(values, "weights", default_weights_)), values)
-                       : makeRival(name, values, protocol);
+      name == "unirit"
+          ? makeUnirit(weights(takeText(values, "weights", default_weights_)), values, protocol)
+          : makeRival(name, values, protocol);
   if (!method) {
     throw std::invalid_argument("method '" + description +
                                 "': unknown, known are identity, best-rigid, icp, gicp, "

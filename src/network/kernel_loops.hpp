@@ -147,8 +147,81 @@ struct Loops {
     }
   }
 
+  /// e^x for x <= 0, to a relative 1e-6; zero below -87. By e^x = 2^n e^r, |r| <= ln 2 / 2, and the
+  /// Taylor series of e^r.
+  static Vector exponential(Vector x) {
+    const Vector lowest = -87.0F - Vector{};
+    const IndexVector underflows = x < lowest;
+    x = underflows ? lowest : x;
+    // Adding 1.5 * 2^23 rounds to a whole number, which then stands in the low bits
+    const Vector shifted = x * 1.44269504F + 12582912.0F;
+    const Vector r = x - (shifted - 12582912.0F) * 0.693147181F;
+    IndexVector n;
+    __builtin_memcpy(&n, &shifted, sizeof(n));
+    const Vector series =
+        1.0F +
+        r * (1.0F +
+             r * (0.5F + r * (1.0F / 6 + r * (1.0F / 24 + r * (1.0F / 120 + r * (1.0F / 720))))));
+    const IndexVector bits = (n - 0x4B400000 + 127) << 23;
+    Vector power;
+    __builtin_memcpy(&power, &bits, sizeof(power));
+    return underflows ? Vector{} : series * power;
+  }
+
+  static Vector affinity(const float* source, const OrientedPointsView& targets, long j,
+                         const AffinityView& view) {
+    const Vector dx = load(targets.position[0] + j) - source[0];
+    const Vector dy = load(targets.position[1] + j) - source[1];
+    const Vector dz = load(targets.position[2] + j) - source[2];
+    const Vector closeness = exponential(view.exponent * (dx * dx + dy * dy + dz * dz));
+    if (!view.oriented) return closeness;
+    const Vector cosine = load(targets.normal[0] + j) * source[3] +
+                          load(targets.normal[1] + j) * source[4] +
+                          load(targets.normal[2] + j) * source[5];
+    return cosine > 0.0F ? closeness * cosine * cosine : Vector{};
+  }
+
+  static float sum(const Vector& vector) {
+    float lanes[Lanes];
+    store(vector, lanes);
+    float total = 0.0F;
+    for (const float lane : lanes) total += lane;
+    return total;
+  }
+
+  static float affinities(const float* source, const OrientedPointsView& targets, const int* blocks,
+                          long block_count, const AffinityView& view, float* target_sums) {
+    Vector total{};
+    for (long b = 0; b < block_count; ++b) {
+      for (long j = blocks[b] * kPointBlock; j < (blocks[b] + 1) * kPointBlock; j += Lanes) {
+        const Vector value = affinity(source, targets, j, view);
+        store(load(target_sums + j) + value, target_sums + j);
+        total += value;
+      }
+    }
+    return sum(total);
+  }
+
+  static void gather(const float* source, const OrientedPointsView& targets, const int* blocks,
+                     long block_count, const AffinityView& view, const float* target_weights,
+                     float source_weight, float* sums) {
+    Vector totals[7] = {};
+    for (long b = 0; b < block_count; ++b) {
+      for (long j = blocks[b] * kPointBlock; j < (blocks[b] + 1) * kPointBlock; j += Lanes) {
+        const Vector weight =
+            affinity(source, targets, j, view) * (load(target_weights + j) + source_weight);
+        totals[0] += weight;
+        for (int axis = 0; axis < 3; ++axis) {
+          totals[1 + axis] += weight * load(targets.position[axis] + j);
+          totals[4 + axis] += weight * load(targets.normal[axis] + j);
+        }
+      }
+    }
+    for (int k = 0; k < 7; ++k) sums[k] = sum(totals[k]);
+  }
+
   static constexpr Kernels kernels(InstructionSet instruction_set) {
-    return {instruction_set, kWidth, dense, denseMaximum, nearest};
+    return {instruction_set, kWidth, dense, denseMaximum, nearest, affinities, gather};
   }
 };
 

@@ -28,8 +28,26 @@ struct RowsView {
   long count;
 };
 
-/// The network's hot loops for one instruction set. An output is the bias, then one multiply-add an
-/// input in their order: it depends on its own row alone, not on its neighbours or the blocking.
+/// Oriented points, one coordinate an array; the count is a multiple of kPointBlock.
+struct OrientedPointsView {
+  const float* position[3];
+  const float* normal[3];
+  long count;
+};
+
+/// Points that a kernel takes together, for every instruction set the same.
+inline constexpr long kPointBlock = 16;
+
+/// How strongly points attract each other: exp(exponent * squared distance), times the square of
+/// the normals' cosine where that is positive and `oriented`, else zero.
+struct AffinityView {
+  float exponent;  ///< negative
+  bool oriented;
+};
+
+/// The hot loops of network and refinement for one instruction set. Of the dense ones, an output is
+/// the bias, then one multiply-add an input in their order: it depends on its own row alone, not on
+/// its neighbours or the blocking.
 struct Kernels {
   InstructionSet instruction_set;
   int panel_width;  ///< outputs computed together
@@ -44,6 +62,17 @@ struct Kernels {
   /// indices[q] = the first of the targets nearest to query q; both are x y z, x y z, ...
   void (*nearest)(const float* queries, long query_count, const float* targets, long target_count,
                   int* indices);
+
+  /// Of one source point (position, normal) to the blocks of targets named: adds each affinity to
+  /// its target's sum and returns the sum over the targets.
+  float (*affinities)(const float* source, const OrientedPointsView& targets, const int* blocks,
+                      long block_count, const AffinityView& affinity, float* target_sums);
+
+  /// sums = { sum of w, of w * position, of w * normal } over the targets of the blocks, where w is
+  /// the affinity times (target weight + source weight).
+  void (*gather)(const float* source, const OrientedPointsView& targets, const int* blocks,
+                 long block_count, const AffinityView& affinity, const float* target_weights,
+                 float source_weight, float* sums);
 };
 
 /// What this processor can run, from the baseline up.

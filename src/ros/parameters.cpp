@@ -168,11 +168,10 @@ Parameters readParameters(const ros::NodeHandle& private_nh) {
                 [&](const char* name, auto& value, auto minimum, auto maximum, const char*) {
                   reader.readNumber(name, value, minimum, maximum);
                 });
-  reader.readWord("stages", toString(registration.stages),
-                  [&](const std::string& word) { registration.stages = stagesFromString(word); });
-  reader.readWord(
-      "network/pairing", toString(registration.network.pairing),
-      [&](const std::string& word) { registration.network.pairing = pairingFromString(word); });
+  for (const WordSetting& word : wordSettings()) {
+    reader.readWord(word.name, word.get(registration),
+                    [&](const std::string& value) { word.set(registration, value); });
+  }
   readNodeSettings(reader, parameters.node);
   reader.noteUnknown();
   return parameters;

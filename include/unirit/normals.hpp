@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include "unirit/point_cloud.hpp"
+
+namespace unirit {
+
+/// Unit normals of a surface's samples, 3 x N, of arbitrary sign: the direction in which the 14
+/// nearest points vary least (Hoppe et al. 1992). Throws std::invalid_argument where there are
+/// fewer than 3 points.
+Points estimateNormals(const Points& points);
+
+/// Turns the normals to the same side of the surface as their neighbours', along the neighbours
+/// that agree best (Hoppe et al. 1992), and outwards at the point farthest from the centroid.
+/// Surfaces in several pieces are oriented piece by piece.
+void orientOutwards(const Points& points, Points& normals);
+
+/// Turns every normal to the half space of the viewpoint (same frame and unit as the points).
+void orientTowards(const Points& points, const Eigen::Vector3f& viewpoint, Points& normals);
+
+/// Length of the mean normal, in [0, 1]. Zero for evenly sampled closed surfaces, whose oriented
+/// areas cancel, 0.5 for a half sphere: tells a whole surface from a view of one side.
+double openness(const Points& normals);
+
+}  // namespace unirit

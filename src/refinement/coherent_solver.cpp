@@ -1,0 +1,185 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "coherent_solver.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <utility>
+
+namespace unirit {
+namespace {
+
+constexpr long kProductRows = 12;  // rows multiplied by one thread at a time: a register tile
+constexpr Eigen::Index kPose = 6;  // rotation vector, translation
+/// Rows and columns of a symmetric 3 x 3 matrix's six entries.
+constexpr std::array<std::pair<int, int>, 6> kEntries{
+    {{0, 0}, {0, 1}, {0, 2}, {1, 1}, {1, 2}, {2, 2}}};
+
+Eigen::Vector3f rotationVector(const Eigen::Matrix3f& rotation) {
+  const Eigen::AngleAxisf angle_axis(rotation);
+  return angle_axis.angle() * angle_axis.axis();
+}
+
+Eigen::Matrix3f rotationOf(const Eigen::Vector3f& vector) {
+  const float angle = vector.norm();
+  if (angle == 0.0F) return Eigen::Matrix3f::Identity();
+  return Eigen::AngleAxisf(angle, vector / angle).toRotationMatrix();
+}
+
+}  // namespace
+
+CoherentSolver::CoherentSolver(const Points& source, const Eigen::MatrixXf& functions,
+                               const PosePrior& prior, const Kernels& kernels, ThreadTeam& team)
+    : source_(source),
+      functions_(functions),
+      prior_(prior),
+      deviations_(prior),
+      kernels_(kernels),
+      team_(team),
+      product_(kernels, {functions, Eigen::VectorXf::Zero(functions.rows())}, Activation::kNone),
+      rows_(6 * rank() + 3 * kPose + 3, source.cols()),
+      products_(rows_.rows(), static_cast<Eigen::Index>(product_.paddedOutputs())),
+      information_(6, source.cols()),
+      matrix_(3 * rank() + kPose, 3 * rank() + kPose),
+      unknowns_(3 * rank() + kPose),
+      factor_(3 * rank() + kPose) {}
+
+/// Each point's information matrix in the source's frame, and the parts of the normal equations
+/// that hold the pose. Residuals count from the reference, pose columns from where points lie now.
+void CoherentSolver::weigh(const Correspondences& correspondences, const Trust& trust,
+                           const CoherentState& state, const Points& reference) {
+  const Eigen::Matrix3f to_source = state.pose.linear().transpose();
+  const Eigen::Vector3f shift = to_source * state.pose.translation();
+  const float along = 1.0F / (trust.along * trust.along);
+  const float across = 1.0F / (trust.across * trust.across);
+  pose_matrix_.setZero();
+  pose_gradient_.setZero();
+  for (Eigen::Index i = 0; i < source_.cols(); ++i) {
+    const Eigen::Vector3f normal = to_source * correspondences.normals.col(i);
+    const float weight = trust.weight * std::min(correspondences.mass[i], 1.0F);
+    Eigen::Matrix3f information = weight * (along - across) * normal * normal.transpose();
+    information.diagonal().array() += weight * across;
+    for (std::size_t entry = 0; entry < kEntries.size(); ++entry) {
+      information_(static_cast<Eigen::Index>(entry), i) =
+          information(kEntries[entry].first, kEntries[entry].second);
+    }
+    const Eigen::Vector3f gradient =
+        information * (to_source * correspondences.positions.col(i) - shift - reference.col(i));
+
+    // The pose moves a point by rotation x point + translation
+    const Eigen::Vector3f moved = moved_.col(i);
+    Eigen::Matrix<float, 3, kPose> columns;
+    columns << 0.0F, moved.z(), -moved.y(), 1.0F, 0.0F, 0.0F,  //
+        -moved.z(), 0.0F, moved.x(), 0.0F, 1.0F, 0.0F,         //
+        moved.y(), -moved.x(), 0.0F, 0.0F, 0.0F, 1.0F;
+    const Eigen::Matrix<float, 3, kPose> weighted = information * columns;
+    pose_matrix_.noalias() += columns.transpose() * weighted;
+    pose_gradient_.noalias() += columns.transpose() * gradient;
+    for (int axis = 0; axis < 3; ++axis) {
+      rows_.col(i).segment<kPose>(6 * rank() + axis * kPose) = weighted.row(axis).transpose();
+    }
+    rows_.col(i).tail<3>() = gradient;
+  }
+}
+
+/// Every weighted row times every function: all inner products that the normal equations need.
+void CoherentSolver::multiply() {
+  team_.forEach(6, [&](int, long entry) {
+    rows_.middleRows(entry * rank(), rank()) =
+        functions_.array().rowwise() * information_.row(entry).array();
+  });
+  const long items = (rows_.rows() + kProductRows - 1) / kProductRows;
+  team_.forEach(items, [&](int, long item) {
+    const long first = item * kProductRows;
+    const RowsView input{rows_.data() + first * rows_.cols(), rows_.cols(),
+                         std::min(kProductRows, rows_.rows() - first)};
+    kernels_.dense(product_.view(), input, 0, product_.view().panel_count,
+                   products_.data() + first * products_.cols(), products_.cols());
+  });
+}
+
+void CoherentSolver::assemble() {
+  const Eigen::Index r = rank();
+  for (std::size_t entry = 0; entry < kEntries.size(); ++entry) {
+    const auto [row, column] = kEntries[entry];
+    matrix_.block(column * r, row * r, r, r) =
+        products_.block(static_cast<Eigen::Index>(entry) * r, 0, r, r);
+  }
+  for (int axis = 0; axis < 3; ++axis) {
+    matrix_.block(3 * r, axis * r, kPose, r) = products_.block(6 * r + axis * kPose, 0, kPose, r);
+    unknowns_.segment(axis * r, r) = products_.row(6 * r + 18 + axis).head(r).transpose();
+  }
+  matrix_.diagonal().head(3 * r).array() += 1.0F;  // the prior's coefficients are standard normal
+  matrix_.bottomRightCorner<kPose, kPose>() = pose_matrix_;
+  unknowns_.tail<kPose>() = pose_gradient_;
+}
+
+void CoherentSolver::addPosePrior(const CoherentState& state, Eigen::Index first) {
+  const float rotation = 1.0F / (deviations_.rotation * deviations_.rotation);
+  const float translation = 1.0F / (deviations_.translation * deviations_.translation);
+  const Eigen::Matrix3f to_source = state.pose.linear().transpose();
+  matrix_.diagonal().segment<3>(first).array() += rotation;
+  matrix_.diagonal().segment<3>(first + 3).array() += translation;
+  unknowns_.segment<3>(first) -= rotation * rotationVector(state.pose.linear());
+  unknowns_.segment<3>(first + 3) -= translation * (to_source * state.pose.translation());
+}
+
+void CoherentSolver::movePose(Eigen::Index first, CoherentState& state) const {
+  state.pose.translation() += state.pose.linear() * unknowns_.segment<3>(first + 3);
+  const Eigen::Quaternionf turned(state.pose.linear() * rotationOf(unknowns_.segment<3>(first)));
+  state.pose.linear() = turned.normalized().toRotationMatrix();
+}
+
+/// The deviations that make pose and its posterior variance most likely; the prior counts as one
+/// further observation of each.
+void CoherentSolver::learnDeviations(const CoherentState& state) {
+  const Eigen::Matrix<float, kPose, kPose> corner =
+      factor_.matrixLLT().bottomRightCorner<kPose, kPose>();
+  const Eigen::Matrix<float, kPose, kPose> inverse =
+      corner.triangularView<Eigen::Lower>().solve(Eigen::Matrix<float, kPose, kPose>::Identity());
+  const Eigen::Matrix<float, 1, kPose> variances = inverse.colwise().squaredNorm();
+  const auto learn = [](float prior, const Eigen::Vector3f& value, float variance) {
+    return std::sqrt((prior * prior + value.squaredNorm() + variance) / 4.0F);
+  };
+  deviations_.rotation =
+      learn(prior_.rotation, rotationVector(state.pose.linear()), variances.head<3>().sum());
+  deviations_.translation =
+      learn(prior_.translation, state.pose.translation(), variances.tail<3>().sum());
+}
+
+void CoherentSolver::solvePose(const Correspondences& correspondences, const Trust& trust,
+                               CoherentState& state) {
+  moved_ = source_ + state.displacements;
+  weigh(correspondences, trust, state, moved_);
+  matrix_.topLeftCorner<kPose, kPose>() = pose_matrix_;
+  unknowns_.head<kPose>() = pose_gradient_;
+  addPosePrior(state, 0);
+  const Eigen::Matrix<float, kPose, kPose> matrix = matrix_.topLeftCorner<kPose, kPose>();
+  unknowns_.head<kPose>() = matrix.llt().solve(unknowns_.head<kPose>()).eval();
+  movePose(0, state);
+}
+
+void CoherentSolver::solve(const Correspondences& correspondences, const Trust& trust,
+                           CoherentState& state) {
+  moved_ = source_ + state.displacements;
+  weigh(correspondences, trust, state, source_);
+  multiply();
+  assemble();
+  const Eigen::Index pose = 3 * rank();
+  addPosePrior(state, pose);
+  factor_.compute(matrix_);
+  factor_.solveInPlace(unknowns_);
+  for (int axis = 0; axis < 3; ++axis) {
+    state.coefficients.row(axis) = unknowns_.segment(axis * rank(), rank()).transpose();
+  }
+  state.displacements.noalias() = state.coefficients * functions_;
+  movePose(pose, state);
+  learnDeviations(state);
+}
+
+Eigen::MatrixXf CoherentSolver::covarianceFactor() const {
+  const Eigen::Index size = matrix_.rows(), coefficients = 3 * rank();
+  return factor_.matrixL().solve(Eigen::MatrixXf::Identity(size, coefficients));
+}
+
+}  // namespace unirit

@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <Eigen/Cholesky>
+#include <Eigen/Geometry>
+
+#include "correspondence.hpp"
+#include "network/dense_layer.hpp"
+
+namespace unirit {
+
+/// What the refinement estimates: p -> pose * (p + displacement(p)). The clouds' unit.
+struct CoherentState {
+  Eigen::Isometry3f pose = Eigen::Isometry3f::Identity();
+  Eigen::Matrix3Xf coefficients;  ///< 3 x rank, of the prior's functions
+  Points displacements;           ///< 3 x N, at the source's points
+};
+
+/// Standard deviations of the pose about the start, before anything is seen.
+struct PosePrior {
+  float rotation = 0.1F;      ///< of the rotation vector, per axis [radian]
+  float translation = 0.05F;  ///< per axis
+};
+
+/// How far a correspondence is trusted along the target's normal and across it.
+struct Trust {
+  float along = 0.1F;   ///< standard deviation
+  float across = 0.1F;  ///< standard deviation
+  float weight = 1.0F;  ///< of one point: neighbours are no independent measurements
+};
+
+/// The maximisation step: displacement and pose that best explain the correspondences under their
+/// priors, a linear least-squares problem in 3 rank + 6 unknowns. The rotation is linearised about
+/// the present pose; the pose's own deviations are estimated with it (empirical Bayes).
+class CoherentSolver {
+ public:
+  /// `functions`: rank x N, the prior's at the source's points. `kernels`, `team` must outlive it.
+  CoherentSolver(const Points& source, const Eigen::MatrixXf& functions, const PosePrior& prior,
+                 const Kernels& kernels, ThreadTeam& team);
+
+  Eigen::Index rank() const { return functions_.rows(); }
+
+  /// Moves the pose alone; the displacement stays as it is.
+  void solvePose(const Correspondences& correspondences, const Trust& trust, CoherentState& state);
+
+  /// Moves pose and displacement.
+  void solve(const Correspondences& correspondences, const Trust& trust, CoherentState& state);
+
+  /// Forgets what was learnt of the pose's deviations.
+  void restart() { deviations_ = prior_; }
+
+  /// After solve: F such that the coefficients of axis a have the covariance F_a^T F_a, where F_a
+  /// are the columns from a * rank on; (3 rank + 6) x 3 rank.
+  Eigen::MatrixXf covarianceFactor() const;
+
+ private:
+  using RowMajor = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+  void weigh(const Correspondences& correspondences, const Trust& trust, const CoherentState& state,
+             const Points& reference);
+  void multiply();
+  void assemble();
+  void addPosePrior(const CoherentState& state, Eigen::Index first);
+  void movePose(Eigen::Index first, CoherentState& state) const;
+  void learnDeviations(const CoherentState& state);
+
+  Points source_;
+  RowMajor functions_;  // rank x N
+  PosePrior prior_;
+  PosePrior deviations_;  // as learnt
+  const Kernels& kernels_;
+  ThreadTeam& team_;
+  DenseLayer product_;  // multiplies rows of N by the functions
+  RowMajor rows_;       // (6 rank + 21) x N: weighted functions, weighted pose columns, gradient
+  RowMajor products_;   // (6 rank + 21) x padded rank
+  Eigen::Matrix<float, 6, Eigen::Dynamic> information_;  // xx xy xz yy yz zz of each point
+  Points moved_;
+  Eigen::Matrix<float, 6, 6> pose_matrix_;
+  Eigen::Matrix<float, 6, 1> pose_gradient_;
+  Eigen::MatrixXf matrix_;  // normal equations
+  Eigen::VectorXf unknowns_;
+  Eigen::LLT<Eigen::MatrixXf> factor_;
+};
+
+}  // namespace unirit

@@ -1,0 +1,162 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "correspondence.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+namespace unirit {
+namespace {
+
+constexpr float kReach = 4.0F;           // affinities beyond so many sigma are below 4e-4
+constexpr long kChunk = 64;              // source points to a chunk, whatever the number of threads
+constexpr float kFarAway = 1e6F;         // where the padding lies
+constexpr float kSourceOutliers = 0.1F;  // background of the source's side over the target's
+constexpr float kFlatVolume = 1e-2F;     // added to each side of the bounding box
+
+/// Sorts indices so that every kPointBlock of them lie close together: halves along the longest
+/// side until a block is left.
+void sortIntoBlocks(const Points& points, int* begin, int* end) {
+  const long count = end - begin;
+  if (count <= kPointBlock) return;
+  Eigen::Vector3f lowest = points.col(*begin), highest = lowest;
+  for (const int* index = begin; index != end; ++index) {
+    lowest = lowest.cwiseMin(points.col(*index));
+    highest = highest.cwiseMax(points.col(*index));
+  }
+  Eigen::Index axis = 0;
+  (highest - lowest).maxCoeff(&axis);
+  const long blocks = (count + kPointBlock - 1) / kPointBlock;
+  int* middle = begin + blocks / 2 * kPointBlock;
+  std::nth_element(begin, middle, end,
+                   [&](int a, int b) { return points(axis, a) < points(axis, b); });
+  sortIntoBlocks(points, begin, middle);
+  sortIntoBlocks(points, middle, end);
+}
+
+/// Position and normal as the kernels read them.
+Eigen::Matrix<float, 6, 1> oriented(const PointCloud& cloud, Eigen::Index i) {
+  Eigen::Matrix<float, 6, 1> point;
+  point << cloud.points.col(i), cloud.normals.col(i);
+  return point;
+}
+
+}  // namespace
+
+CorrespondenceEstimator::CorrespondenceEstimator(const PointCloud& target, const Kernels& kernels,
+                                                 ThreadTeam& team)
+    : kernels_(kernels),
+      team_(team),
+      target_count_(target.size()),
+      padded_((target.size() + kPointBlock - 1) / kPointBlock * kPointBlock),
+      targets_(static_cast<std::size_t>(6 * padded_)),
+      nearby_(static_cast<std::size_t>(team.size())),
+      target_weights_(static_cast<std::size_t>(padded_)) {
+  std::vector<int> order(static_cast<std::size_t>(target_count_));
+  std::iota(order.begin(), order.end(), 0);
+  sortIntoBlocks(target.points, order.data(), order.data() + order.size());
+  std::fill_n(targets_.data(), 3 * padded_, kFarAway);
+  for (long j = 0; j < target_count_; ++j) {
+    const Eigen::Matrix<float, 6, 1> point = oriented(target, order[static_cast<std::size_t>(j)]);
+    for (int k = 0; k < 6; ++k) row(k)[j] = point[k];
+  }
+  for (long first = 0; first < target_count_; first += kPointBlock) {
+    const long count = std::min(kPointBlock, target_count_ - first);
+    Points members(3, count);
+    for (int axis = 0; axis < 3; ++axis) {
+      members.row(axis) = Eigen::Map<const Eigen::RowVectorXf>(row(axis) + first, count);
+    }
+    const Eigen::Vector3f centre = members.rowwise().mean();
+    blocks_.push_back({centre, (members.colwise() - centre).colwise().norm().maxCoeff()});
+  }
+  for (Nearby& nearby : nearby_) nearby.blocks.resize(blocks_.size());
+  const Eigen::Vector3f sides =
+      target.points.rowwise().maxCoeff() - target.points.rowwise().minCoeff();
+  volume_ = (sides.array() + kFlatVolume).prod();
+}
+
+float* CorrespondenceEstimator::row(int index) { return targets_.data() + index * padded_; }
+
+OrientedPointsView CorrespondenceEstimator::view() const {
+  const float* first = targets_.data();
+  return {{first, first + padded_, first + 2 * padded_},
+          {first + 3 * padded_, first + 4 * padded_, first + 5 * padded_},
+          padded_};
+}
+
+void CorrespondenceEstimator::findNearby(const Eigen::Vector3f& point, float reach,
+                                         Nearby& nearby) const {
+  nearby.count = 0;
+  for (std::size_t b = 0; b < blocks_.size(); ++b) {
+    const float far = reach + blocks_[b].radius;
+    if ((blocks_[b].centre - point).squaredNorm() > far * far) continue;
+    nearby.blocks[static_cast<std::size_t>(nearby.count++)] = static_cast<int>(b);
+  }
+}
+
+/// Sums over the source for each target (into the target weights), over the target for each source.
+void CorrespondenceEstimator::sumAffinities(const PointCloud& source, float reach,
+                                            const AffinityView& affinity) {
+  const long chunks = (source.size() + kChunk - 1) / kChunk;
+  if (chunks > chunk_capacity_) {
+    chunk_sums_ = AlignedFloats(static_cast<std::size_t>(chunks * padded_));
+    chunk_capacity_ = chunks;
+  }
+  source_sums_.resize(static_cast<std::size_t>(source.size()));
+  team_.forEach(chunks, [&](int thread, long chunk) {
+    float* sums = chunk_sums_.data() + chunk * padded_;
+    std::fill_n(sums, padded_, 0.0F);
+    Nearby& nearby = nearby_[static_cast<std::size_t>(thread)];
+    for (long i = chunk * kChunk; i < std::min((chunk + 1) * kChunk, source.size()); ++i) {
+      findNearby(source.points.col(i), reach, nearby);
+      source_sums_[static_cast<std::size_t>(i)] = kernels_.affinities(
+          oriented(source, i).data(), view(), nearby.blocks.data(), nearby.count, affinity, sums);
+    }
+  });
+  Eigen::Map<Eigen::ArrayXf> totals(target_weights_.data(), padded_);
+  totals.setZero();
+  for (long chunk = 0; chunk < chunks; ++chunk) {
+    totals += Eigen::Map<const Eigen::ArrayXf>(chunk_sums_.data() + chunk * padded_, padded_);
+  }
+}
+
+void CorrespondenceEstimator::estimate(const PointCloud& source,
+                                       const Eigen::RowVectorXf& visibility,
+                                       const Attraction& attraction,
+                                       Correspondences& correspondences) {
+  const float reach = kReach * attraction.sigma;
+  const AffinityView affinity{-0.5F / (attraction.sigma * attraction.sigma), attraction.oriented};
+  sumAffinities(source, reach, affinity);
+
+  // Responsibilities are affinities over their sums and a uniform background
+  const float spread = 2.0F * static_cast<float>(M_PI) * attraction.sigma * attraction.sigma;
+  const float background = attraction.outlier_share / (1.0F - attraction.outlier_share) * spread *
+                           std::sqrt(spread) / volume_;
+  const float target_share = 1.0F / (1.0F + attraction.symmetry);
+  Eigen::Map<Eigen::ArrayXf> target_weights(target_weights_.data(), padded_);
+  target_weights = target_share / (target_weights + background * static_cast<float>(source.size()));
+  const float source_background = kSourceOutliers * background * static_cast<float>(target_count_);
+
+  correspondences.mass.resize(source.size());
+  correspondences.positions.resize(3, source.size());
+  correspondences.normals.resize(3, source.size());
+  const long chunks = (source.size() + kChunk - 1) / kChunk;
+  team_.forEach(chunks, [&](int thread, long chunk) {
+    Nearby& nearby = nearby_[static_cast<std::size_t>(thread)];
+    for (long i = chunk * kChunk; i < std::min((chunk + 1) * kChunk, source.size()); ++i) {
+      findNearby(source.points.col(i), reach, nearby);
+      const float source_weight = (1.0F - target_share) * visibility[i] /
+                                  (source_sums_[static_cast<std::size_t>(i)] + source_background);
+      Eigen::Matrix<float, 7, 1> sums;
+      kernels_.gather(oriented(source, i).data(), view(), nearby.blocks.data(), nearby.count,
+                      affinity, target_weights_.data(), source_weight, sums.data());
+      const bool any = sums[0] > 0.0F;
+      correspondences.mass[i] = sums[0];
+      correspondences.positions.col(i) =
+          any ? Eigen::Vector3f(sums.segment<3>(1) / sums[0]) : source.points.col(i).eval();
+      correspondences.normals.col(i) = sums.tail<3>().stableNormalized();
+    }
+  });
+}
+
+}  // namespace unirit

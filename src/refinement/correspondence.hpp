@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <vector>
+
+#include "network/aligned_floats.hpp"
+#include "network/kernels.hpp"
+#include "network/thread_team.hpp"
+#include "unirit/point_cloud.hpp"
+
+namespace unirit {
+
+/// How source and target points attract each other. Lengths in the clouds' unit.
+struct Attraction {
+  float sigma = 0.1F;          ///< standard deviation of the distance
+  float outlier_share = 0.1F;  ///< of the target points, a uniform background
+  bool oriented = true;        ///< weigh by the square of the normals' cosine
+  float symmetry = 4.0F;       ///< weight of "each visible source point lies on the target" over
+                               ///< "each target point lies on the source"; 0: the latter alone
+};
+
+/// What the target says of each source point.
+struct Correspondences {
+  Eigen::RowVectorXf mass;  ///< N, sum of the responsibilities
+  Points positions;         ///< 3 x N, mean target point; the source's own where the mass is zero
+  Points normals;           ///< 3 x N, mean target normal, a unit vector or zero
+};
+
+/// Soft correspondences of a moving source with a target that stays: the expectation step of
+/// coherent point drift (Myronenko & Song 2010, eq. 7), with normals. Target points far from a
+/// source point, in units of sigma, are passed over block by block. Allocates only where the
+/// source grows.
+class CorrespondenceEstimator {
+ public:
+  /// `target` with normals. `kernels` and `team` must outlive it.
+  CorrespondenceEstimator(const PointCloud& target, const Kernels& kernels, ThreadTeam& team);
+
+  /// `source` with normals; `visibility` in [0, 1]: how sure it is that each source point is seen.
+  void estimate(const PointCloud& source, const Eigen::RowVectorXf& visibility,
+                const Attraction& attraction, Correspondences& correspondences);
+
+ private:
+  struct Block {
+    Eigen::Vector3f centre;
+    float radius;
+  };
+  /// What one thread writes while it goes through source points.
+  struct Nearby {
+    std::vector<int> blocks;
+    long count = 0;
+  };
+
+  void findNearby(const Eigen::Vector3f& point, float reach, Nearby& nearby) const;
+  void sumAffinities(const PointCloud& source, float reach, const AffinityView& affinity);
+  OrientedPointsView view() const;
+  float* row(int index);
+
+  const Kernels& kernels_;
+  ThreadTeam& team_;
+  long target_count_;
+  long padded_;            // to whole blocks
+  AlignedFloats targets_;  // six rows: x, y, z, normal x, y, z
+  float volume_;           // of the target's bounding box
+  std::vector<Block> blocks_;
+  std::vector<Nearby> nearby_;  // one a thread
+  AlignedFloats chunk_sums_;    // one row a chunk of source points
+  long chunk_capacity_ = 0;
+  AlignedFloats target_weights_;
+  std::vector<float> source_sums_;
+};
+
+}  // namespace unirit

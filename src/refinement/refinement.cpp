@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "refinement.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "unirit/normals.hpp"
+
+namespace unirit {
+namespace {
+
+// Lengths in half extents of the organ
+constexpr double kPriorLength = 0.4;
+constexpr double kPriorAmplitude = 0.087;
+constexpr int kRank = 48;
+constexpr PosePrior kPosePrior{0.1F, 0.05F};
+constexpr float kWidestSigma = 0.4F;    // where the pose alone is sought
+constexpr float kFirstSigma = 0.12F;    // where the displacement joins it
+constexpr float kSurfaceAcross = 0.2F;  // deviation along the surface, which geometry hardly sees
+constexpr float kPointsAcross = 0.01F;
+constexpr float kSurfaceWeight = 0.3F;
+constexpr double kWholeOpenness = 0.2;  // mean normal of a surface seen from all sides, at most
+constexpr float kFar = 8.0F;            // a viewpoint that is not known lies so far away
+constexpr float kGrazingCosine = 0.2F;  // surely seen from kGrazingCosine + kGrazingRange on
+constexpr float kGrazingRange = 0.3F;
+
+/// Geometric sequence from `first` to `last` in `steps`.
+float annealed(float first, float last, int step, int steps) {
+  if (step >= steps) return last;
+  return first * std::pow(last / first, static_cast<float>(step) / static_cast<float>(steps));
+}
+
+}  // namespace
+
+Refinement::Refinement(const PointCloud& source, const RefinementSettings& settings,
+                       const Kernels& kernels, ThreadTeam& team)
+    : source_(source),
+      settings_(settings),
+      kernels_(kernels),
+      team_(team),
+      prior_(std::make_shared<const DisplacementPrior>(source.points, kPriorLength, kPriorAmplitude,
+                                                       kRank)),
+      solver_(source.points, prior_->functions(source.points), kPosePrior, kernels, team) {}
+
+void Refinement::move(const CoherentState& state) {
+  moved_.points = state.pose * (source_.points + state.displacements);
+  moved_.normals = state.pose.linear() * source_.normals;
+}
+
+/// How sure it is that the camera sees each point: whether it faces it.
+Eigen::RowVectorXf Refinement::visibility(const PointCloud& moved,
+                                          const std::optional<Eigen::Vector3f>& viewpoint) const {
+  if (!viewpoint) return Eigen::RowVectorXf::Ones(moved.size());
+  const Points rays = ((-moved.points).colwise() + *viewpoint).colwise().normalized();
+  const Eigen::RowVectorXf cosines = moved.normals.cwiseProduct(rays).colwise().sum();
+  return ((cosines.array() - kGrazingCosine) / kGrazingRange).max(0.0F).min(1.0F);
+}
+
+Refined Refinement::refine(const PointCloud& target, const Points& displacements) {
+  // A whole surface is seen from all sides, a part from the viewpoint or where its normals point
+  PointCloud seen{target.points, estimateNormals(target.points)};
+  orientOutwards(seen.points, seen.normals);
+  const bool whole = openness(seen.normals) < kWholeOpenness;
+  std::optional<Eigen::Vector3f> eye;
+  if (!whole) {
+    eye = target.viewpoint ? *target.viewpoint
+                           : Eigen::Vector3f(centroid(seen.points) +
+                                             kFar * seen.normals.rowwise().mean().normalized());
+    orientTowards(seen.points, *eye, seen.normals);
+  }
+
+  CorrespondenceEstimator estimator(seen, kernels_, team_);
+  const bool points = settings_.correspondence == Correspondence::kPoints;
+  Attraction attraction;
+  if (points) {
+    attraction.oriented = false;
+    attraction.symmetry = 0.0F;
+  }
+  solver_.restart();
+  CoherentState state{Eigen::Isometry3f::Identity(), Eigen::Matrix3Xf::Zero(3, solver_.rank()),
+                      displacements};
+  const auto expect = [&](float sigma) {
+    attraction.sigma = sigma;
+    move(state);
+    estimator.estimate(moved_, visibility(moved_, eye), attraction, correspondences_);
+  };
+  const auto trust = [&](float sigma, float across) {
+    return Trust{sigma, std::hypot(across, sigma), points ? 1.0F : kSurfaceWeight};
+  };
+
+  const auto last = static_cast<float>(settings_.last_sigma);
+  const int pose_steps = whole ? settings_.pose_iterations : 0;
+  for (int step = 0; step < pose_steps; ++step) {
+    const float sigma = annealed(kWidestSigma, kFirstSigma, step, pose_steps);
+    expect(sigma);
+    solver_.solvePose(correspondences_, trust(sigma, 0.0F), state);
+  }
+  for (int step = 0; step < settings_.iterations; ++step) {
+    const float sigma = annealed(kFirstSigma, last, step, settings_.iterations * 4 / 5);
+    expect(sigma);
+    solver_.solve(correspondences_, trust(sigma, points ? kPointsAcross : kSurfaceAcross), state);
+  }
+  return {state.pose, state.coefficients, solver_.covarianceFactor(), whole};
+}
+
+}  // namespace unirit

@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <memory>
+#include <optional>
+
+#include "coherent_solver.hpp"
+#include "correspondence.hpp"
+#include "displacement_prior.hpp"
+#include "unirit/settings.hpp"
+
+namespace unirit {
+
+/// What the refinement found: p -> pose * (p + prior->displacements(p, coefficients)).
+struct Refined {
+  Eigen::Isometry3f pose = Eigen::Isometry3f::Identity();
+  Eigen::Matrix3Xf coefficients;      ///< 3 x rank
+  Eigen::MatrixXf covariance_factor;  ///< CoherentSolver::covarianceFactor
+  bool whole = false;                 ///< the target was taken for the whole surface
+};
+
+/// The coherent refinement: expectation maximisation of pose and smooth displacement, annealed from
+/// coarse to fine. It works in the network's unit, half the organ's extent. Holds what depends on
+/// the organ alone; not thread-safe.
+class Refinement {
+ public:
+  /// `source`: 3 x N samples of the organ with outward normals.
+  Refinement(const PointCloud& source, const RefinementSettings& settings, const Kernels& kernels,
+             ThreadTeam& team);
+
+  /// `target`: 3 x M samples of what is seen, about where the source lies, normals are estimated;
+  /// its viewpoint in the same frame, if known. `displacements`: 3 x N, of the source, where the
+  /// search begins.
+  Refined refine(const PointCloud& target, const Points& displacements);
+
+  const std::shared_ptr<const DisplacementPrior>& prior() const { return prior_; }
+  const PointCloud& source() const { return source_; }
+
+ private:
+  Eigen::RowVectorXf visibility(const PointCloud& moved,
+                                const std::optional<Eigen::Vector3f>& viewpoint) const;
+  void move(const CoherentState& state);
+
+  PointCloud source_;
+  RefinementSettings settings_;
+  const Kernels& kernels_;
+  ThreadTeam& team_;
+  std::shared_ptr<const DisplacementPrior> prior_;
+  CoherentSolver solver_;
+  PointCloud moved_;
+  Correspondences correspondences_;
+};
+
+}  // namespace unirit
