@@ -113,6 +113,16 @@ TEST_F(PairSets, SayOfEachCaseWhatItWasMadeFrom) {
   EXPECT_EQ(read.cases[1].seed, 0xFFFFFFFFFFFFFFF1ULL);
 }
 
+TEST_F(PairSets, MayHoldNoSamplesOfTheSurface) {
+  const std::string bare = (folder() / "bare.safetensors").string();
+  PairSet without = set();
+  for (PairSetCase& one : without.cases) one.seen.points.surface.resize(3, 0);
+  writePairSet(without, bare);
+  const PairSet read = readPairSet(bare);
+  EXPECT_EQ(read.pair(read.cases[0], Protocol::kCaseB).surface.cols(), 0);
+  EXPECT_EQ(read.cases[0].seen.points.truth, without.cases[0].seen.points.truth);
+}
+
 TEST_F(PairSets, LackAProtocolOnlyWithAnError) {
   EXPECT_THROW(set().pair(set().cases[0], Protocol::kPermuted), std::invalid_argument);
 }
