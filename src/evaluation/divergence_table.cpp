@@ -79,7 +79,7 @@ std::string toMarkdown(const DivergenceTable& table) {
     rows += "| " + table.labels[i] + " |";
     for (std::size_t j = 0; j < table.labels.size(); ++j) {
       const auto row = static_cast<Eigen::Index>(i), column = static_cast<Eigen::Index>(j);
-      char cell[64] = " no two subjects |";
+      char cell[64] = " no two surfaces |";
       if (std::isfinite(table.mean(row, column))) {
         std::snprintf(cell, sizeof(cell), " %.2f ± %.2f |", table.mean(row, column),
                       table.spread(row, column));

@@ -103,6 +103,10 @@ ParsedPairsOptions parsePairsOptions(int argc, char** argv) {
       ->capture_default_str();
   app.add_option("--divergences", options.divergences,
                  "also writes a Markdown table of the divergence L_mc of organ against organ");
+  app.add_option("--components", options.divergence.components,
+                 "of the Gaussian mixtures behind that table")
+      ->check(CLI::Range(1, 64))
+      ->capture_default_str();
   addScreening(app, settings.limits, lengths);
 
   try {

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "unirit/evaluation/divergence_table.hpp"
 #include "unirit/evaluation/pair_builder.hpp"
 
 namespace unirit {
@@ -15,6 +16,7 @@ struct PairsOptions {
   int phantoms = 0;                  ///< patients of each phantom organ
   std::string output;                ///< the pair set; the manifest lies beside it
   std::string divergences;           ///< file for the table of organ against organ; empty: none
+  DivergenceSettings divergence;     ///< of that table
   double unit = 0.001;               ///< of the surfaces' files [m]
   PairSettings settings;
 };

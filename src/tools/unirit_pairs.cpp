@@ -15,7 +15,6 @@
 #include "../atomic_file.hpp"
 #include "pairs_manifest.hpp"
 #include "pairs_options.hpp"
-#include "unirit/evaluation/divergence_table.hpp"
 #include "unirit/hash.hpp"
 #include "unirit/io/organ_folder.hpp"
 #include "unirit/simulation/phantom.hpp"
@@ -102,14 +101,14 @@ void printSummary(const BuiltPairs& pairs, const PairsOptions& options) {
 }
 
 /// Of the organs as they were read, each once.
-std::string divergencesOf(const PairSet& set) {
+std::string divergencesOf(const PairSet& set, const DivergenceSettings& settings) {
   std::vector<LabelledCloud> clouds;
   for (const PairSetCase& one : set.cases) {
     if (one.variation == 0 && one.deformation == 0) {
       clouds.push_back({one.organ, one.seen.points.source});
     }
   }
-  return toMarkdown(divergenceTable(clouds));
+  return toMarkdown(divergenceTable(clouds, settings));
 }
 
 void writeText(const std::string& text, const std::string& path) {
@@ -130,7 +129,9 @@ void run(const PairsOptions& options) {
   writePairSet(pairs.set, options.output);
   writeText(pairsManifest(options, pairs, left_out, sha256Hex(contents(options.output))),
             fs::path(options.output).replace_extension(".json").string());
-  if (!options.divergences.empty()) writeText(divergencesOf(pairs.set), options.divergences);
+  if (!options.divergences.empty()) {
+    writeText(divergencesOf(pairs.set, options.divergence), options.divergences);
+  }
   printSummary(pairs, options);
 }
 

@@ -120,7 +120,7 @@ TEST(DivergenceTable, IsSymmetricAndTellsShapesApart) {
   const std::string text = toMarkdown(table);
   EXPECT_EQ(text.rfind("| L_mc | ball | egg | single |\n|---|---|---|---|\n| ball |", 0), 0U)
       << text;
-  EXPECT_NE(text.find("no two subjects |\n"), std::string::npos) << text;
+  EXPECT_NE(text.find("no two surfaces |\n"), std::string::npos) << text;
 }
 
 }  // namespace

@@ -16,7 +16,7 @@ struct LabelledCloud {
 };
 
 struct DivergenceSettings {
-  int components = 16;     ///< of each cloud's mixture
+  int components = 3;      ///< of each cloud's mixture
   int pairs = 12;          ///< of clouds drawn for each pair of classes
   int repeats = 4;         ///< of the draw
   std::uint64_t seed = 1;  ///< of the mixtures and draws
