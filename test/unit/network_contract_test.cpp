@@ -128,6 +128,8 @@ TEST(NetworkContract, costsAreThoseOfThePaper) {
     return 1e-9 * multiplyAdds(1024, 1024, iterations, Pairing::kNearest, with_savings);
   };
   const double encoder = 1e-9 * 1024 * 147648;
+  EXPECT_NEAR(encoder, 0.1512, 0.00005);
+  EXPECT_NEAR(giga(0, false) - 3 * encoder, 2.867, 0.0005);  // three encoders beside the decoder
   EXPECT_NEAR(giga(8, false), 4.56, 0.005);
   EXPECT_NEAR(giga(8, true), 2.41, 0.01);
   EXPECT_NEAR(giga(0, false) - encoder, 3.17, 0.005);  // with no iteration the target's is left
