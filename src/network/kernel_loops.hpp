@@ -168,17 +168,23 @@ struct Loops {
     return underflows ? Vector{} : series * power;
   }
 
+  /// Affinities of one source point to the targets from j on; `sign` is that of the cosines.
   static Vector affinity(const float* source, const OrientedPointsView& targets, long j,
-                         const AffinityView& view) {
+                         const AffinityView& view, Vector& sign) {
     const Vector dx = load(targets.position[0] + j) - source[0];
     const Vector dy = load(targets.position[1] + j) - source[1];
     const Vector dz = load(targets.position[2] + j) - source[2];
     const Vector closeness = exponential(view.exponent * (dx * dx + dy * dy + dz * dz));
-    if (!view.oriented) return closeness;
+    const Vector one = 1.0F - Vector{};
+    sign = one;
+    if (view.normals == NormalUse::kNone) return closeness;
     const Vector cosine = load(targets.normal[0] + j) * source[3] +
                           load(targets.normal[1] + j) * source[4] +
                           load(targets.normal[2] + j) * source[5];
-    return cosine > 0.0F ? closeness * cosine * cosine : Vector{};
+    sign = cosine < 0.0F ? -one : one;
+    const Vector both_sides = closeness * cosine * cosine;
+    if (view.normals == NormalUse::kUnsigned) return both_sides;
+    return cosine > 0.0F ? both_sides : Vector{};
   }
 
   static float sum(const Vector& vector) {
@@ -194,7 +200,8 @@ struct Loops {
     Vector total{};
     for (long b = 0; b < block_count; ++b) {
       for (long j = blocks[b] * kPointBlock; j < (blocks[b] + 1) * kPointBlock; j += Lanes) {
-        const Vector value = affinity(source, targets, j, view);
+        Vector sign;
+        const Vector value = affinity(source, targets, j, view, sign);
         store(load(target_sums + j) + value, target_sums + j);
         total += value;
       }
@@ -208,12 +215,13 @@ struct Loops {
     Vector totals[7] = {};
     for (long b = 0; b < block_count; ++b) {
       for (long j = blocks[b] * kPointBlock; j < (blocks[b] + 1) * kPointBlock; j += Lanes) {
+        Vector sign;
         const Vector weight =
-            affinity(source, targets, j, view) * (load(target_weights + j) + source_weight);
+            affinity(source, targets, j, view, sign) * (load(target_weights + j) + source_weight);
         totals[0] += weight;
         for (int axis = 0; axis < 3; ++axis) {
           totals[1 + axis] += weight * load(targets.position[axis] + j);
-          totals[4 + axis] += weight * load(targets.normal[axis] + j);
+          totals[4 + axis] += weight * sign * load(targets.normal[axis] + j);
         }
       }
     }

@@ -38,11 +38,18 @@ struct OrientedPointsView {
 /// Points that a kernel takes together, for every instruction set the same.
 inline constexpr long kPointBlock = 16;
 
-/// How strongly points attract each other: exp(exponent * squared distance), times the square of
-/// the normals' cosine where that is positive and `oriented`, else zero.
+/// What normals do to the attraction between two points.
+enum class NormalUse {
+  kNone,
+  kUnsigned,  ///< factor: the square of their cosine
+  kSigned,    ///< the same, but zero where the cosine is negative
+};
+
+/// How strongly points attract each other: exp(exponent * squared distance), times what the normals
+/// make of it.
 struct AffinityView {
   float exponent;  ///< negative
-  bool oriented;
+  NormalUse normals;
 };
 
 /// The hot loops of network and refinement for one instruction set. Of the dense ones, an output is
@@ -69,7 +76,7 @@ struct Kernels {
                       long block_count, const AffinityView& affinity, float* target_sums);
 
   /// sums = { sum of w, of w * position, of w * normal } over the targets of the blocks, where w is
-  /// the affinity times (target weight + source weight).
+  /// the affinity times (target weight + source weight); normals are turned to the source's side.
   void (*gather)(const float* source, const OrientedPointsView& targets, const int* blocks,
                  long block_count, const AffinityView& affinity, const float* target_weights,
                  float source_weight, float* sums);

@@ -125,7 +125,7 @@ void CorrespondenceEstimator::estimate(const PointCloud& source,
                                        const Attraction& attraction,
                                        Correspondences& correspondences) {
   const float reach = kReach * attraction.sigma;
-  const AffinityView affinity{-0.5F / (attraction.sigma * attraction.sigma), attraction.oriented};
+  const AffinityView affinity{-0.5F / (attraction.sigma * attraction.sigma), attraction.normals};
   sumAffinities(source, reach, affinity);
 
   // Responsibilities are affinities over their sums and a uniform background

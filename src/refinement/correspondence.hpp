@@ -14,9 +14,9 @@ namespace unirit {
 struct Attraction {
   float sigma = 0.1F;          ///< standard deviation of the distance
   float outlier_share = 0.1F;  ///< of the target points, a uniform background
-  bool oriented = true;        ///< weigh by the square of the normals' cosine
-  float symmetry = 4.0F;       ///< weight of "each visible source point lies on the target" over
-                               ///< "each target point lies on the source"; 0: the latter alone
+  NormalUse normals = NormalUse::kSigned;
+  float symmetry = 4.0F;  ///< weight of "each visible source point lies on the target" over
+                          ///< "each target point lies on the source"; 0: the latter alone
 };
 
 /// What the target says of each source point.

@@ -19,7 +19,9 @@ constexpr float kFirstSigma = 0.12F;    // where the displacement joins it
 constexpr float kSurfaceAcross = 0.2F;  // deviation along the surface, which geometry hardly sees
 constexpr float kPointsAcross = 0.01F;
 constexpr float kSurfaceWeight = 0.3F;
-constexpr double kWholeOpenness = 0.2;  // mean normal of a surface seen from all sides, at most
+// Mean normal of a surface seen from all sides, at most; a viewpoint speaks for one side
+constexpr double kWholeOpenness = 0.25;
+constexpr double kWholeOpennessFromViewpoint = 0.1;
 constexpr float kFar = 8.0F;            // a viewpoint that is not known lies so far away
 constexpr float kGrazingCosine = 0.2F;  // surely seen from kGrazingCosine + kGrazingRange on
 constexpr float kGrazingRange = 0.3F;
@@ -60,7 +62,8 @@ Refined Refinement::refine(const PointCloud& target, const Points& displacements
   // A whole surface is seen from all sides, a part from the viewpoint or where its normals point
   PointCloud seen{target.points, estimateNormals(target.points)};
   orientOutwards(seen.points, seen.normals);
-  const bool whole = openness(seen.normals) < kWholeOpenness;
+  const bool whole =
+      openness(seen.normals) < (target.viewpoint ? kWholeOpennessFromViewpoint : kWholeOpenness);
   std::optional<Eigen::Vector3f> eye;
   if (!whole) {
     eye = target.viewpoint ? *target.viewpoint
@@ -72,8 +75,9 @@ Refined Refinement::refine(const PointCloud& target, const Points& displacements
   CorrespondenceEstimator estimator(seen, kernels_, team_);
   const bool points = settings_.correspondence == Correspondence::kPoints;
   Attraction attraction;
+  attraction.normals = whole ? NormalUse::kUnsigned : NormalUse::kSigned;
   if (points) {
-    attraction.oriented = false;
+    attraction.normals = NormalUse::kNone;
     attraction.symmetry = 0.0F;
   }
   solver_.restart();
