@@ -41,6 +41,7 @@ checkNumber() {
 
 rviz=true
 organ=
+phantom=liver
 arguments=()
 while (($# > 0)); do
   case $1 in
@@ -51,7 +52,7 @@ while (($# > 0)); do
     --headless) rviz=false ;;
     --registrations | --seed | --phantom)
       (($# > 1)) || refuse "$1 needs a value"
-      [[ $1 == --phantom ]] || checkNumber "$1" "$2"
+      if [[ $1 == --phantom ]]; then phantom=$2; else checkNumber "$1" "$2"; fi
       arguments+=("${1#--}:=$2")
       shift
       ;;
@@ -67,6 +68,7 @@ done
 
 source "$(dirname "${BASH_SOURCE[0]}")/setup.sh"
 "$root/scripts/build.sh" "${demo_targets[@]}"
+"$root/build/devel/lib/unirit/demo_camera" --check "$organ" "$phantom" || exit 2
 
 if $rviz && ! timeout 5 xdpyinfo &>/dev/null; then
   echo "No display can be opened: running without rviz."

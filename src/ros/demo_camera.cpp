@@ -13,6 +13,7 @@
 #include <optional>
 #include <sstream>
 #include <stdexcept>
+#include <string>
 
 #include "conversions.hpp"
 #include "demo_report.hpp"
@@ -62,11 +63,10 @@ Surface readOrgan(const std::string& file) {
   throw std::runtime_error(sentence.str());
 }
 
-Surface loadOrgan(const ros::NodeHandle& nh) {
-  const std::string file = nh.param<std::string>("organ", "");
+/// The organ of a file, or the phantom of that name where none is given.
+Surface loadOrgan(const std::string& file, const std::string& phantom, int seed) {
   if (!file.empty()) return readOrgan(file);
-  return makePhantom(nh.param<std::string>("phantom", "liver"),
-                     static_cast<std::uint64_t>(nh.param("seed", 1)));
+  return makePhantom(phantom, static_cast<std::uint64_t>(seed));
 }
 
 std_msgs::Header header(const std::string& frame, ros::Time stamp) {
@@ -226,11 +226,19 @@ void Demo::report(const RegistrationResult& result, const TrueErrors& errors) {
 }  // namespace unirit
 
 /// A simulated operating room that shows what the registration node does, with known truth.
+/// `demo_camera --check FILE PHANTOM` only says, without ROS, whether it can show this organ.
 int main(int argc, char** argv) {
-  ros::init(argc, argv, "demo");
   try {
+    if (argc == 4 && argv[1] == std::string("--check")) {
+      unirit::loadOrgan(argv[2], argv[3], 1);
+      return 0;
+    }
+    ros::init(argc, argv, "demo");
     const ros::NodeHandle nh("~");
-    return unirit::Demo(nh, unirit::loadOrgan(nh)).run() ? 0 : 1;
+    const unirit::Surface organ =
+        unirit::loadOrgan(nh.param<std::string>("organ", ""),
+                          nh.param<std::string>("phantom", "liver"), nh.param("seed", 1));
+    return unirit::Demo(nh, organ).run() ? 0 : 1;
   } catch (const std::exception& error) {
     std::fprintf(stderr, "demo: %s\n", error.what());
     return 1;
