@@ -9,6 +9,7 @@
 #include <stdexcept>
 
 #include "unirit/evaluation/case_folder.hpp"
+#include "unirit/evaluation/pair_set.hpp"
 #include "unirit/io/organ_folder.hpp"
 #include "unirit/random.hpp"
 #include "unirit/simulation/phantom.hpp"
@@ -55,14 +56,34 @@ std::string labelOf(const BenchmarkOptions& options) {
   return std::filesystem::weakly_canonical(folder).filename().string();
 }
 
+bool wanted(const BenchmarkOptions& options, const std::string& protocol) {
+  const auto& all = options.protocols;
+  return std::find(all.begin(), all.end(), protocol) != all.end();
+}
+
 std::vector<BenchmarkCase> storedCases(const BenchmarkOptions& options) {
   std::vector<BenchmarkCase> cases;
   for (const CaseFolder& folder : listCaseFolders(options.cases)) {
-    const auto& wanted = options.protocols;
-    if (std::find(wanted.begin(), wanted.end(), folder.protocol) == wanted.end()) continue;
+    if (!wanted(options, folder.protocol)) continue;
     cases.push_back({labelOf(options), protocolFromString(folder.protocol), folder.organ,
                      folder.subject, "stored",
                      [path = folder.path] { return readCaseFolder(path); }});
+  }
+  return cases;
+}
+
+std::vector<BenchmarkCase> pairSetCases(const BenchmarkOptions& options) {
+  const auto set = std::make_shared<const PairSet>(readPairSet(options.cases));
+  std::vector<BenchmarkCase> cases;
+  for (const Protocol protocol : set->protocols) {
+    if (!wanted(options, toString(protocol))) continue;
+    for (const PairSetCase& one : set->cases) {
+      std::string subject = one.subject;
+      if (one.variation > 0) subject += " variation " + std::to_string(one.variation);
+      if (one.deformation > 0) subject += " deformation " + std::to_string(one.deformation);
+      cases.push_back({labelOf(options), protocol, one.organ, subject, std::to_string(one.seed),
+                       [set, &one, protocol] { return set->pair(one, protocol); }});
+    }
   }
   return cases;
 }
@@ -93,9 +114,11 @@ std::vector<BenchmarkCase> madeCases(const BenchmarkOptions& options) {
 }  // namespace
 
 std::vector<BenchmarkCase> benchmarkCases(const BenchmarkOptions& options) {
-  const std::vector<BenchmarkCase> cases =
-      options.cases.empty() ? madeCases(options) : storedCases(options);
-  if (cases.empty()) throw std::runtime_error("no cases: the folder holds none of the protocols");
+  const std::vector<BenchmarkCase> cases = options.cases.empty() ? madeCases(options)
+                                           : std::filesystem::is_regular_file(options.cases)
+                                               ? pairSetCases(options)
+                                               : storedCases(options);
+  if (cases.empty()) throw std::runtime_error("no cases: the data hold none of the protocols");
   return cases;
 }
 

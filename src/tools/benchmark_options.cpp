@@ -14,8 +14,9 @@ void addDataOptions(CLI::App& app, BenchmarkOptions& options) {
                                   "Digital phantoms of each organ, in place of --data")
                        ->check(CLI::Range(1, 1000))
                        ->excludes(data);
-  app.add_option("--cases", options.cases,
-                 "Folder of stored cases, PROTOCOL/ORGAN_SUBJECT/*.ply, in place of both")
+  app.add_option(
+         "--cases", options.cases,
+         "Pair set of unirit_pairs, or folder PROTOCOL/ORGAN_SUBJECT/*.ply, in place of both")
       ->excludes(data)
       ->excludes(phantoms);
   app.add_option("--label", options.label,

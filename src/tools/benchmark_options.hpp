@@ -12,7 +12,7 @@ namespace unirit {
 struct BenchmarkOptions {
   std::string data;   // folder of organs
   int phantoms = 0;   // of each organ, in place of `data`
-  std::string cases;  // folder of stored cases, in place of both
+  std::string cases;  // pair set or folder of stored cases, in place of both
   std::string label;  // what tables call the data; empty: the folder's name
   std::vector<std::string> exclude{"small_bowel"};
   std::vector<std::string> protocols{"permuted", "resampled", "caseb", "partial", "intraop"};

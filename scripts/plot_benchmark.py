@@ -1,0 +1,137 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""Draws what unirit_benchmark wrote: plot_benchmark.py FOLDER [OUTPUT]
+
+FOLDER is the benchmark's --output. OUTPUT (default: FOLDER/plots) gets PNG and SVG files for each
+protocol: error per organ, error against the displacement before, accuracy against time; and, where
+the benchmark ran with --clouds, the worst cases of each method before and after. Needs matplotlib
+and numpy (python3-matplotlib).
+"""
+import collections
+import csv
+import os
+import re
+import sys
+
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+import numpy as np
+
+from point_files import read_ply
+
+WORST = 3
+OBLIQUE = np.array([[0.87, 0.50, 0.0], [0.17, -0.30, 0.94]])  # rows span the drawing plane
+
+
+def read_rows(folder):
+    """Rows by protocol and method, in the file's order."""
+    rows = collections.defaultdict(lambda: collections.defaultdict(list))
+    with open(os.path.join(folder, "cases.csv"), encoding="utf-8") as file:
+        for row in csv.DictReader(file):
+            rows[row["protocol"]][row["method"]].append(row)
+    return rows
+
+
+def column(rows, name):
+    return np.array([float(row[name]) for row in rows])
+
+
+def save(figure, output, name):
+    for ending in ("png", "svg"):
+        figure.savefig(os.path.join(output, f"{name}.{ending}"), dpi=120, bbox_inches="tight",
+                       metadata={"Date": None} if ending == "svg" else {})
+    plt.close(figure)
+
+
+def caption(axes, protocol, methods):
+    row = next(iter(methods.values()))[0]
+    axes.set_title(f"{protocol}: {row['data']}, {row['machine']}", fontsize=9)
+
+
+def plot_organs(protocol, methods, output):
+    organs = sorted({row["organ"] for rows in methods.values() for row in rows})
+    figure, axes = plt.subplots(figsize=(2 + 1.2 * len(organs), 4))
+    width = 0.8 / len(methods)
+    for i, (method, rows) in enumerate(methods.items()):
+        means = [column([row for row in rows if row["organ"] == organ], "rmse_mm").mean()
+                 if any(row["organ"] == organ for row in rows) else np.nan for organ in organs]
+        axes.bar(np.arange(len(organs)) + (i + 0.5) * width - 0.4, means, width, label=method)
+    counts = collections.Counter(row["organ"] for row in next(iter(methods.values())))
+    axes.set_xticks(range(len(organs)), [f"{organ}\n({counts[organ]})" for organ in organs])
+    axes.set_ylabel("mean RMSE [mm]")
+    axes.legend(fontsize=7, ncol=2)
+    caption(axes, protocol, methods)
+    save(figure, output, f"organs_{protocol}")
+
+
+def plot_displacement(protocol, methods, output):
+    figure, axes = plt.subplots(figsize=(6, 5))
+    for method, rows in methods.items():
+        axes.plot(column(rows, "before_mm"), column(rows, "rmse_mm"), ".", label=method, alpha=0.7)
+    limit = max(column(rows, "before_mm").max() for rows in methods.values())
+    axes.plot([0, limit], [0, limit], "k:", linewidth=1)
+    axes.set_xlabel("RMS displacement before [mm]")
+    axes.set_ylabel("RMSE after [mm]")
+    axes.legend(fontsize=7)
+    caption(axes, protocol, methods)
+    save(figure, output, f"displacement_{protocol}")
+
+
+def plot_time(protocol, methods, output):
+    figure, axes = plt.subplots(figsize=(6, 4))
+    for method, rows in methods.items():
+        time, error = column(rows, "cpu_ms").mean(), column(rows, "rmse_mm").mean()
+        axes.plot(max(time, 0.01), error, "o")
+        axes.annotate(method, (max(time, 0.01), error), textcoords="offset points", xytext=(4, 4),
+                      fontsize=7)
+    axes.set_xscale("log")
+    axes.set_xlabel("CPU time a case, one thread [ms]")
+    axes.set_ylabel("mean RMSE [mm]")
+    caption(axes, protocol, methods)
+    save(figure, output, f"time_{protocol}")
+
+
+def draw(axes, clouds, title):
+    for cloud, colour in clouds:
+        flat = cloud @ OBLIQUE.T
+        axes.scatter(flat[:, 0], flat[:, 1], s=2, c=colour, linewidths=0)
+    axes.set_aspect("equal")
+    axes.set_axis_off()
+    axes.set_title(title, fontsize=7)
+
+
+def plot_worst(protocol, method, rows, folder, output):
+    """Target blue, source before and after red, true positions grey."""
+    worst = sorted(rows, key=lambda row: -float(row["rmse_mm"]))[:WORST]
+    figure, axes = plt.subplots(2, len(worst), figsize=(3.2 * len(worst), 6), squeeze=False)
+    for i, row in enumerate(worst):
+        case = os.path.join(folder, "clouds", protocol, f"{row['organ']}_{row['subject']}")
+        target, truth = read_ply(f"{case}/target.ply"), read_ply(f"{case}/truth.ply")
+        for line, (name, key) in enumerate([("source", "before_mm"),
+                                            (f"moved by {method}", "rmse_mm")]):
+            draw(axes[line, i], [(truth, "0.8"), (target, "tab:blue"),
+                                 (read_ply(f"{case}/{name}.ply"), "tab:red")],
+                 f"{row['organ']} {row['subject']}: {float(row[key]):.1f} mm")
+    figure.suptitle(f"{protocol}, {method}: worst cases, before and after", fontsize=9)
+    save(figure, output, f"worst_{protocol}_{re.sub('[^A-Za-z0-9+-]+', '_', method).strip('_')}")
+
+
+def main(folder, output=None):
+    output = output or os.path.join(folder, "plots")
+    os.makedirs(output, exist_ok=True)
+    matplotlib.rcParams["svg.hashsalt"] = "unirit"  # the same rows give the same files
+    for protocol, methods in read_rows(folder).items():
+        plot_organs(protocol, methods, output)
+        plot_displacement(protocol, methods, output)
+        plot_time(protocol, methods, output)
+        if os.path.isdir(os.path.join(folder, "clouds", protocol)):
+            for method, rows in methods.items():
+                plot_worst(protocol, method, rows, folder, output)
+
+
+if __name__ == "__main__":
+    if len(sys.argv) not in (2, 3):
+        sys.exit(__doc__)
+    main(*sys.argv[1:])
