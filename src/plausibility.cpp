@@ -11,7 +11,6 @@ namespace unirit {
 namespace {
 
 constexpr double kMillimetresPerMetre = 1000.0;
-constexpr double kUnitSlack = 10.0;  // organs of one scene differ by less than this factor
 constexpr double kRotationTolerance = 1e-6;
 
 /// Standard deviations along the principal axes, smallest first.
@@ -34,6 +33,14 @@ double rotationError(const Eigen::Isometry3d& pose) {
   const Eigen::Matrix3d rotation = pose.linear();
   const double error = (rotation * rotation.transpose() - Eigen::Matrix3d::Identity()).norm();
   return rotation.determinant() > 0.0 ? error : error + 2.0;
+}
+
+/// Asks for another unit where that would bring the value between its limits.
+const char* unitQuestion(double value, double least, double most) {
+  const auto fits = [&](double scale) { return scale * value >= least && scale * value <= most; };
+  if (fits(1.0 / kMillimetresPerMetre)) return ": is it in millimetres, read as metres?";
+  if (fits(kMillimetresPerMetre)) return ": is it in metres, read as millimetres?";
+  return "";
 }
 
 PlausibilityCheck atMost(const char* name, double value, double limit) {
@@ -63,21 +70,22 @@ std::optional<std::string> findMismatch(const PointCloud& preoperative,
                                         const PointCloud& intraoperative,
                                         const PlausibilitySettings& settings) {
   const double organ = extent(preoperative.points);
-  const double seen = extent(intraoperative.points);
-  const double ratio = seen / organ;
-  if (ratio >= settings.min_extent_ratio && ratio <= settings.max_extent_ratio) return std::nullopt;
+  const double least = settings.min_organ_extent, most = settings.max_organ_extent;
   std::ostringstream sentence;
-  sentence << "the intra-operative cloud's extent of " << seen << " m is " << ratio
-           << " times the organ's " << organ << " m";
-  const double by_unit = std::abs(std::log(ratio)) - std::log(kMillimetresPerMetre);
-  if (std::abs(by_unit) < std::log(kUnitSlack)) {
-    sentence << ": is the " << (ratio > 1.0 ? "intra-operative" : "pre-operative")
-             << " cloud in millimetres instead of metres?";
-  } else {
-    sentence << ", outside [" << settings.min_extent_ratio << ", " << settings.max_extent_ratio
-             << "]";
+  if (organ < least || organ > most) {
+    sentence << "the pre-operative cloud's extent of " << organ << " m is no organ's, outside ["
+             << least << ", " << most << "] m" << unitQuestion(organ, least, most);
+    return sentence.str();
   }
-  return sentence.str();
+  const double ratio = extent(intraoperative.points) / organ;
+  if (ratio < settings.min_extent_ratio || ratio > settings.max_extent_ratio) {
+    sentence << "the intra-operative cloud's extent of " << ratio * organ << " m is " << ratio
+             << " times the organ's " << organ << " m, outside [" << settings.min_extent_ratio
+             << ", " << settings.max_extent_ratio << "]"
+             << unitQuestion(ratio, settings.min_extent_ratio, settings.max_extent_ratio);
+    return sentence.str();
+  }
+  return std::nullopt;
 }
 
 std::vector<PlausibilityCheck> checkOutput(const Registration& registration, double organ_extent,

@@ -20,8 +20,9 @@ struct Registration;
 std::optional<std::string> findFault(const PointCloud& cloud, const std::string& name,
                                      const PlausibilitySettings& settings);
 
-/// Why the two clouds cannot belong together: an extent off by about 1000 (millimetres taken for
-/// metres or the reverse) or outside the settings' range.
+/// Why the two clouds cannot belong together: an extent of the first that no organ has, or of the
+/// second, over that, outside the settings' range. Says so where millimetres taken for metres, or
+/// the reverse, explain it.
 std::optional<std::string> findMismatch(const PointCloud& preoperative,
                                         const PointCloud& intraoperative,
                                         const PlausibilitySettings& settings);

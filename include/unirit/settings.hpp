@@ -47,6 +47,8 @@ struct RefinementSettings {
 struct PlausibilitySettings {
   int min_points = 50;                 ///< points in either cloud, after invalid ones are dropped
   double min_thickness = 0.005;        ///< second and third principal deviation over the first
+  double min_organ_extent = 0.01;      ///< of the pre-operative cloud [m]
+  double max_organ_extent = 1.0;       ///< same, from above [m]
   double min_extent_ratio = 0.1;       ///< extent of the intra-operative cloud over the organ's
   double max_extent_ratio = 3.0;       ///< same, from above
   double inlier_tolerance = 0.005;     ///< cloud points nearer than this are inliers [m]
@@ -104,6 +106,10 @@ void visitSettings(Settings& settings, Visitor&& visitor) {
   visitor("plausibility/min_points", p.min_points, 4, 100000, "fewest points in either cloud");
   visitor("plausibility/min_thickness", p.min_thickness, 0.0, 1.0,
           "second and third principal deviation over the first, at least");
+  visitor("plausibility/min_organ_extent", p.min_organ_extent, 0.0, 1.0,
+          "extent of the pre-operative cloud, at least [m]");
+  visitor("plausibility/max_organ_extent", p.max_organ_extent, 0.01, 1000.0,
+          "extent of the pre-operative cloud, at most [m]");
   visitor("plausibility/min_extent_ratio", p.min_extent_ratio, 0.0, 1.0,
           "extent of the cloud over the organ's, at least");
   visitor("plausibility/max_extent_ratio", p.max_extent_ratio, 1.0, 100.0,

@@ -17,9 +17,18 @@ std::string faultOf(const Points& points) {
   return findFault({points, {}}, "the cloud", kDefaults).value_or("");
 }
 
-std::string mismatchOf(double scale) {
-  const Points organ = test::bumpyEllipsoid(200, 1);
-  return findMismatch({organ, {}}, {static_cast<float>(scale) * organ, {}}, kDefaults).value_or("");
+/// Of an organ of 0.2 m and what is seen of it, both in other units.
+std::string mismatchOf(double seen_scale, double organ_scale = 1.0) {
+  const Points points = test::bumpyEllipsoid(200, 1);
+  const auto scaled = [&](double scale) {
+    return PointCloud{static_cast<float>(scale) * points, {}};
+  };
+  return findMismatch(scaled(organ_scale), scaled(seen_scale), kDefaults).value_or("");
+}
+
+void expectNames(const std::string& sentence, const std::string& cloud, const std::string& cause) {
+  EXPECT_EQ(sentence.rfind("the " + cloud + " cloud's extent", 0), 0U) << sentence;
+  EXPECT_NE(sentence.find(cause), std::string::npos) << sentence;
 }
 
 /// A registration that passes every check, of an organ of 0.2 m.
@@ -53,19 +62,38 @@ TEST(FindFault, NamesEmptyTinyPlanarCollinearAndRepeatedClouds) {
   EXPECT_NE(faultOf(Points::Constant(3, 100, 1.0F)).find("single point"), std::string::npos);
 }
 
-TEST(FindMismatch, TellsMillimetresFromMetres) {
+const char* const kMillimetres = "is it in millimetres, read as metres?";
+const char* const kMetres = "is it in metres, read as millimetres?";
+
+TEST(FindMismatch, AcceptsOrgansOfAnySizeAndViewsOfThem) {
   EXPECT_EQ(mismatchOf(1.0), "");
   EXPECT_EQ(mismatchOf(0.4), "");
-  EXPECT_NE(mismatchOf(1000.0).find("is the intra-operative cloud in millimetres"),
-            std::string::npos);
-  EXPECT_NE(mismatchOf(400.0).find("millimetres"), std::string::npos);
-  EXPECT_NE(mismatchOf(0.001).find("is the pre-operative cloud in millimetres"), std::string::npos);
+  EXPECT_EQ(mismatchOf(0.1, 0.1), "");
+  EXPECT_EQ(mismatchOf(3.0, 3.0), "");
 }
 
-TEST(FindMismatch, NamesOtherExtents) {
-  EXPECT_NE(mismatchOf(5.0).find("5 times the organ's"), std::string::npos);
-  EXPECT_EQ(mismatchOf(5.0).find("millimetres"), std::string::npos);
-  EXPECT_NE(mismatchOf(0.05).find("outside"), std::string::npos);
+TEST(FindMismatch, BlamesTheCloudThatIsInAnotherUnit) {
+  expectNames(mismatchOf(1000.0), "intra-operative", kMillimetres);
+  expectNames(mismatchOf(400.0), "intra-operative", kMillimetres);
+  expectNames(mismatchOf(0.001), "intra-operative", kMetres);
+  expectNames(mismatchOf(1.0, 1000.0), "pre-operative", kMillimetres);
+  expectNames(mismatchOf(1.0, 0.001), "pre-operative", kMetres);
+}
+
+TEST(FindMismatch, NoticesThatBothAreInAnotherUnit) {
+  expectNames(mismatchOf(1000.0, 1000.0), "pre-operative", kMillimetres);
+  expectNames(mismatchOf(0.001, 0.001), "pre-operative", kMetres);
+}
+
+TEST(FindMismatch, NamesOtherExtentsWithoutAskingForUnits) {
+  for (const std::string& sentence : {mismatchOf(5.0), mismatchOf(0.05), mismatchOf(30.0)}) {
+    expectNames(sentence, "intra-operative", "times the organ's");
+    EXPECT_EQ(sentence.find("read as"), std::string::npos) << sentence;
+  }
+  const std::string huge = mismatchOf(6.0, 6.0), dot = mismatchOf(0.02, 0.02);
+  expectNames(huge, "pre-operative", "is no organ's, outside [0.01, 1] m");
+  expectNames(dot, "pre-operative", "is no organ's");
+  EXPECT_EQ((huge + dot).find("read as"), std::string::npos);
 }
 
 TEST(CheckOutput, PassesAPlausibleRegistration) { EXPECT_EQ(refusalOf(plausible()), ""); }
