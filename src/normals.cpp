@@ -77,6 +77,30 @@ Points estimateNormals(const Points& points) {
   return normals;
 }
 
+void turnFacesOutwards(Surface& mesh) {
+  if (mesh.faces.cols() == 0) return;
+  const Points offsets = mesh.vertices.points.colwise() - centroid(mesh.vertices.points);
+  double volume = 0.0;  // six times it
+  for (Eigen::Index f = 0; f < mesh.faces.cols(); ++f) {
+    const auto corner = [&](int k) { return offsets.col(mesh.faces(k, f)); };
+    volume += static_cast<double>(corner(0).dot(corner(1).cross(corner(2))));
+  }
+  if (volume < 0.0) mesh.faces.row(1).swap(mesh.faces.row(2));
+}
+
+Points vertexNormals(const Surface& mesh) {
+  const Points& vertices = mesh.vertices.points;
+  Points normals = Points::Zero(3, vertices.cols());
+  for (Eigen::Index f = 0; f < mesh.faces.cols(); ++f) {
+    const Eigen::Vector3i face = mesh.faces.col(f);
+    const Eigen::Vector3f a = vertices.col(face[0]);
+    const Eigen::Vector3f twice_area = (vertices.col(face[1]) - a).cross(vertices.col(face[2]) - a);
+    for (const int corner : face) normals.col(corner) += twice_area;
+  }
+  for (auto normal : normals.colwise()) normal.stableNormalize();
+  return normals;
+}
+
 void orientOutwards(const Points& points, Points& normals) {
   const auto graph = neighbourGraph(points);
   const Points offsets = points.colwise() - centroid(points);

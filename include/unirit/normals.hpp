@@ -10,6 +10,13 @@ namespace unirit {
 /// fewer than 3 points.
 Points estimateNormals(const Points& points);
 
+/// Reverses all faces of a closed mesh that has them inside out: its signed volume is negative.
+void turnFacesOutwards(Surface& mesh);
+
+/// Unit normals of a mesh's vertices, 3 x N: the mean of the normals of the faces around each, by
+/// area. Zero where a vertex has no face with an area.
+Points vertexNormals(const Surface& mesh);
+
 /// Turns the normals to the same side of the surface as their neighbours', along the neighbours
 /// that agree best (Hoppe et al. 1992), and outwards at the point farthest from the centroid.
 /// Surfaces in several pieces are oriented piece by piece.

@@ -44,16 +44,20 @@ ParsedOptions parseRegisterOptions(int argc, char** argv) {
       ->capture_default_str();
   app.add_option("--weights", options.weights, "network's weights; default: the package's own");
   app.add_option("--settings", options.settings, "YAML file such as config/unirit.yaml");
-  app.add_option("--stages", options.stages, "rigid,nonrigid or one of them; default: both");
-  const CLI::Option* correspondence =
-      app.add_option("--correspondence", "surface or points; for the refinement, not there yet")
-          ->expected(1);
+  app.add_option("--stages", options.stages,
+                 "some of rigid,nonrigid,refine, in this order; default: all");
+  app.add_option("--correspondence", options.correspondence,
+                 "what a point of INTRAOP is: anywhere on the surface, or one of PREOP's points, "
+                 "moved; for the refinement; default: surface")
+      ->type_name("surface|points");
   app.add_option("--points", options.points,
                  "further points of the pre-operative frame, such as a tumour: written, moved, as "
                  "points.ply");
-  app.add_option("--viewpoint", viewpoint,
-                 "where the sensor stood, in INTRAOP's frame and unit; no stage so far uses it")
-      ->type_name("X Y Z");
+  const CLI::Option* viewpoint_option =
+      app.add_option("--viewpoint", viewpoint,
+                     "where the sensor stood, in INTRAOP's frame and unit; default: what a PCD "
+                     "says, else unknown")
+          ->type_name("X Y Z");
   app.add_option("--units", units, "unit of all files: mm or m")
       ->check(CLI::IsMember({"mm", "m"}))
       ->capture_default_str();
@@ -64,10 +68,6 @@ ParsedOptions parseRegisterOptions(int argc, char** argv) {
 
   try {
     app.parse(argc, argv);
-    if (correspondence->count() > 0) {
-      throw CLI::ValidationError("--correspondence",
-                                 "belongs to the refinement stage, which does not exist yet");
-    }
     if (!std::all_of(viewpoint.begin(), viewpoint.end(),
                      [](double x) { return std::isfinite(x); })) {
       throw CLI::ValidationError("--viewpoint", "must be three finite numbers");
@@ -79,6 +79,9 @@ ParsedOptions parseRegisterOptions(int argc, char** argv) {
     parsed.exit_status = 2;
   }
   options.unit = units == "m" ? 1.0 : 0.001;
+  if (viewpoint_option->count() > 0) {
+    options.viewpoint = (options.unit * Eigen::Vector3d(viewpoint.data())).cast<float>();
+  }
   return parsed;
 }
 

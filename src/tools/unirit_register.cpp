@@ -10,6 +10,7 @@
 #include "unirit/io/result_json.hpp"
 #include "unirit/io/settings_yaml.hpp"
 #include "unirit/io/surface_io.hpp"
+#include "unirit/normals.hpp"
 #include "unirit/registration.hpp"
 #include "unirit/sampling.hpp"
 
@@ -44,10 +45,14 @@ Job prepare(const RegisterOptions& options) {
   job.settings.network.pairing = job.weights->pairing;
   if (!options.settings.empty()) readSettings(options.settings, job.settings);
   if (!options.stages.empty()) job.settings.stages = stagesFromString(options.stages);
+  if (!options.correspondence.empty()) {
+    job.settings.refinement.correspondence = correspondenceFromString(options.correspondence);
+  }
   if (options.threads) job.settings.threads = *options.threads;
   validate(job.settings);
   job.preoperative = readSurface(options.preoperative, options.unit);
   job.intraoperative = readSurface(options.intraoperative, options.unit);
+  if (options.viewpoint) job.intraoperative.viewpoint = options.viewpoint;
   if (!options.points.empty()) {
     const SurfaceFile file = readSurface(options.points, options.unit);
     if (file.dropped > 0) {
@@ -62,22 +67,33 @@ Job prepare(const RegisterOptions& options) {
   return job;
 }
 
-/// The vertices, followed by points on the faces where the vertices alone are too coarse.
-PointCloud cloudOf(const Surface& surface, int sampled_points, std::uint64_t seed) {
+/// The vertices, followed by points on the faces where the vertices alone are too coarse. Normals
+/// are those of the faces; a bare cloud keeps its own.
+PointCloud cloudOf(const SurfaceFile& file, int sampled_points, std::uint64_t seed) {
   constexpr Eigen::Index kDensity = 4;  // points for each one that the network is given
-  PointCloud cloud{surface.vertices.points, {}};
-  const Eigen::Index wanted = kDensity * sampled_points;
-  if (surface.faces.cols() == 0 || cloud.size() >= wanted) return cloud;
-  const PointCloud samples = sampleByArea(surface, wanted, seed);
-  cloud.points.conservativeResize(Eigen::NoChange, cloud.size() + wanted);
-  cloud.points.rightCols(wanted) = samples.points;
+  Surface surface = file.surface;
+  PointCloud& cloud = surface.vertices;
+  cloud.viewpoint = file.viewpoint;
+  if (surface.faces.cols() == 0) return cloud;
+  turnFacesOutwards(surface);
+  cloud.normals = vertexNormals(surface);
+  const Eigen::Index vertices = cloud.size(), wanted = kDensity * sampled_points;
+  if (vertices < wanted) {
+    const PointCloud samples = sampleByArea(surface, wanted, seed);
+    cloud.points.conservativeResize(Eigen::NoChange, vertices + wanted);
+    cloud.normals.conservativeResize(Eigen::NoChange, vertices + wanted);
+    cloud.points.rightCols(wanted) = samples.points;
+    cloud.normals.rightCols(wanted) = samples.normals;
+  }
+  // Vertices without a face have none: then all are estimated
+  if ((cloud.normals.colwise().squaredNorm().array() == 0.0F).any()) cloud.normals.resize(3, 0);
   return cloud;
 }
 
 Registration registerSurfaces(const Job& job, std::uint64_t seed) {
   const int points = job.settings.sampling.points;
-  const PointCloud preoperative = cloudOf(job.preoperative.surface, points, seed);
-  const PointCloud intraoperative = cloudOf(job.intraoperative.surface, points, seed + 1);
+  const PointCloud preoperative = cloudOf(job.preoperative, points, seed);
+  const PointCloud intraoperative = cloudOf(job.intraoperative, points, seed + 1);
   return Registrar(job.weights, job.settings)
       .registerClouds(preoperative, intraoperative, alignCentroids(preoperative, intraoperative));
 }
