@@ -14,8 +14,8 @@ namespace {
 bool belongsToNode(const std::string& key) {
   static const std::set<std::string> keys{"auto_register",     "every_cloud",  "fixed_frame",
                                           "initial_alignment", "initial_pose", "invert_tf",
-                                          "publish_tf",        "stale_after",  "tf_rate",
-                                          "tf_timeout",        "weights"};
+                                          "publish_tf",        "sensor_frame", "stale_after",
+                                          "tf_rate",           "tf_timeout",   "weights"};
   return keys.count(key) > 0;
 }
 

@@ -11,7 +11,6 @@
 #include <optional>
 #include <sstream>
 
-#include "names.hpp"
 #include "refusal.hpp"
 
 namespace unirit {
@@ -156,14 +155,20 @@ ReceivedCloud fromMessage(const PointCloud2& message, const std::string& name) {
   return received;
 }
 
-PointCloud2 toMessage(const Points& points, const Points& displacements,
+PointCloud2 toMessage(const Points& points, const std::vector<PointValues>& values,
                       const ReceivedCloud& source, const std_msgs::Header& header) {
   PointCloud2 message;
   message.header = header;
   message.height = 1;
   message.width = static_cast<std::uint32_t>(source.total);
   message.fields = {floatField("x", 0), floatField("y", 1), floatField("z", 2)};
-  if (displacements.cols() > 0) message.fields.push_back(floatField(names::kDisplacementField, 3));
+  std::vector<const PointValues*> known;
+  for (const PointValues& value : values) {
+    if (value.values.size() == 0) continue;
+    message.fields.push_back(
+        floatField(value.field, static_cast<std::uint32_t>(message.fields.size())));
+    known.push_back(&value);
+  }
   const auto numbers = static_cast<Eigen::Index>(message.fields.size());
   message.point_step = static_cast<std::uint32_t>(numbers) * sizeof(float);
   message.row_step = message.width * message.point_step;
@@ -175,7 +180,9 @@ PointCloud2 toMessage(const Points& points, const Points& displacements,
   for (Eigen::Index i = 0; i < points.cols(); ++i) {
     auto row = rows.col(source.kept[static_cast<std::size_t>(i)]);
     row.head<3>() = points.col(i);
-    if (numbers == 4) row[3] = displacements.col(i).norm();
+    for (std::size_t k = 0; k < known.size(); ++k) {
+      row[3 + static_cast<Eigen::Index>(k)] = known[k]->values[i];
+    }
   }
   message.data.resize(static_cast<std::size_t>(rows.size()) * sizeof(float));
   std::memcpy(message.data.data(), rows.data(), message.data.size());
@@ -188,11 +195,9 @@ PointCloud2 toMessage(const Points& points, const std_msgs::Header& header) {
   all.kept.resize(static_cast<std::size_t>(points.cols()));
   std::iota(all.kept.begin(), all.kept.end(), 0);
   all.cloud.points = points;
-  return toMessage(points, Points(3, 0), all, header);
+  return toMessage(points, {}, all, header);
 }
 
-PointCloud2 emptyCloud(const std_msgs::Header& header) {
-  return toMessage(Points(3, 0), Points(3, 0), ReceivedCloud(), header);
-}
+PointCloud2 emptyCloud(const std_msgs::Header& header) { return toMessage(Points(3, 0), header); }
 
 }  // namespace unirit

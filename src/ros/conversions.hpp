@@ -24,9 +24,15 @@ struct ReceivedCloud {
 /// (INVALID_INPUT) with a sentence that begins with `name` where sizes, fields or types are wrong.
 ReceivedCloud fromMessage(const sensor_msgs::PointCloud2& message, const std::string& name);
 
-/// Message with x y z [m] for all `source.total` points, in their order; dropped ones are NaN.
-/// `displacements` (3 x N, or empty) adds the field `displacement`, their lengths [m].
-sensor_msgs::PointCloud2 toMessage(const Points& points, const Points& displacements,
+/// A number of each point beside its place.
+struct PointValues {
+  const char* field;          ///< its name in the message
+  Eigen::RowVectorXf values;  ///< one a point; a field without any is left out
+};
+
+/// Message with x y z [m] and the values for all `source.total` points, in their order; dropped
+/// ones are NaN.
+sensor_msgs::PointCloud2 toMessage(const Points& points, const std::vector<PointValues>& values,
                                    const ReceivedCloud& source, const std_msgs::Header& header);
 
 /// Message with x y z [m] for the points, in their order.

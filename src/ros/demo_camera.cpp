@@ -22,6 +22,7 @@
 #include "unirit/io/surface_io.hpp"
 #include "unirit/metrics.hpp"
 #include "unirit/point_cloud.hpp"
+#include "unirit/settings.hpp"
 #include "unirit/simulation/phantom.hpp"
 
 namespace unirit {
@@ -30,8 +31,7 @@ namespace {
 constexpr char kWorldFrame[] = "world";
 constexpr char kCameraFrame[] = "camera_optical";
 constexpr char kPreoperativeFrame[] = "preoperative";
-constexpr double kMillimetre = 0.001;                          // unit of organ files [m]
-constexpr double kSmallestOrgan = 0.005, kLargestOrgan = 2.0;  // extent [m]
+constexpr double kMillimetre = 0.001;  // unit of organ files [m]
 
 SceneSettings readSceneSettings(const ros::NodeHandle& nh) {
   SceneSettings scene;
@@ -56,7 +56,8 @@ SceneSettings readSceneSettings(const ros::NodeHandle& nh) {
 Surface readOrgan(const std::string& file) {
   const Surface organ = readSurface(file, kMillimetre).surface;
   const double size = extent(organ.vertices.points);
-  if (size >= kSmallestOrgan && size <= kLargestOrgan) return organ;
+  const PlausibilitySettings limits;
+  if (size >= limits.min_organ_extent && size <= limits.max_organ_extent) return organ;
   std::ostringstream sentence;
   sentence << file << " holds an organ of " << size / kMillimetre
            << " mm: is it in another unit than millimetres?";

@@ -17,6 +17,9 @@ inline constexpr char kDeformPoints[] = "deform_points";
 inline constexpr char kThresholds[] = "plausibility";  // namespace of the dynamic parameters
 
 inline constexpr char kDisplacementField[] = "displacement";
+inline constexpr char kConfidenceField[] = "confidence";
+
+inline constexpr char kNoSensor[] = "none";  // in place of a sensor's frame
 
 inline constexpr char kStartGuess[] = "initial guess";
 inline constexpr char kStartAccepted[] = "accepted";

@@ -152,6 +152,7 @@ void readNodeSettings(Reader& reader, NodeSettings& node) {
     node.initial_alignment = word;
   });
   reader.read("fixed_frame", node.fixed_frame);
+  reader.read("sensor_frame", node.sensor_frame);
   reader.read("publish_tf", node.publish_tf);
   reader.read("invert_tf", node.invert_tf);
   reader.readNumber("tf_rate", node.tf_rate, 0.1, 1000.0);
@@ -181,6 +182,8 @@ PlausibilitySettings fromConfig(const UniritConfig& config) {
   PlausibilitySettings settings;
   settings.min_points = config.min_points;
   settings.min_thickness = config.min_thickness;
+  settings.min_organ_extent = config.min_organ_extent;
+  settings.max_organ_extent = config.max_organ_extent;
   settings.min_extent_ratio = config.min_extent_ratio;
   settings.max_extent_ratio = config.max_extent_ratio;
   settings.inlier_tolerance = config.inlier_tolerance;

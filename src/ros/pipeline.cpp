@@ -119,6 +119,16 @@ Eigen::Isometry3d Pipeline::placeCloud(const Job& job, const std::string& fixed_
   return bridge_.lookUp(header.frame_id, fixed_frame, header.stamp, settings_.tf_timeout);
 }
 
+/// Where the sensor stood, in the cloud's frame, at its stamp. Drivers publish clouds in the frame
+/// of their camera.
+std::optional<Eigen::Vector3f> Pipeline::placeSensor(const std_msgs::Header& cloud) const {
+  if (settings_.sensor_frame == names::kNoSensor) return std::nullopt;
+  if (settings_.sensor_frame.empty()) return Eigen::Vector3f::Zero();
+  const Eigen::Isometry3d T_cloud_sensor =
+      bridge_.lookUp(cloud.frame_id, settings_.sensor_frame, cloud.stamp, settings_.tf_timeout);
+  return T_cloud_sensor.translation().cast<float>();
+}
+
 void Pipeline::attempt(const Job& job, const Attempt* accepted, ros::Time now, Attempt& attempt) {
   checkMessages(job, now);
   const std_msgs::Header& header = job.intraoperative->header;
@@ -126,7 +136,7 @@ void Pipeline::attempt(const Job& job, const Attempt* accepted, ros::Time now, A
   // Messages to clouds
   const auto started = std::chrono::steady_clock::now();
   const ReceivedCloud organ = fromMessage(*job.preoperative, names::kPreoperativeCloud);
-  const ReceivedCloud seen = fromMessage(*job.intraoperative, names::kIntraoperativeCloud);
+  ReceivedCloud seen = fromMessage(*job.intraoperative, names::kIntraoperativeCloud);
   const std::chrono::duration<double, std::milli> conversion =
       std::chrono::steady_clock::now() - started;
 
@@ -135,6 +145,7 @@ void Pipeline::attempt(const Job& job, const Attempt* accepted, ros::Time now, A
   const Eigen::Isometry3d T_cloud_fixed = placeCloud(job, attempt.fixed_frame);
   if (accepted != nullptr && accepted->fixed_frame != attempt.fixed_frame) accepted = nullptr;
   const auto guess = job.detached ? job.guess : std::exchange(guess_, std::nullopt);
+  seen.cloud.viewpoint = placeSensor(header);
   const Start start = chooseStart(job, guess, accepted, T_cloud_fixed);
   attempt.result.start = start.name;
 
@@ -159,10 +170,13 @@ void Pipeline::attempt(const Job& job, const Attempt* accepted, ros::Time now, A
   fillIn(registration, thresholds.inlier_tolerance, attempt.result);
   attempt.deformation = registration.deformation;
   if (!registration.deformation) return;
-  attempt.deformed = toMessage(registration.deformation->movedSurface(),
-                               registration.deformation->displacements(), organ, header);
-  attempt.rigid = toMessage(registration.deformation->moveRigidly(organ.cloud.points), Points(3, 0),
-                            organ, header);
+  const Deformation& deformation = *registration.deformation;
+  attempt.deformed =
+      toMessage(deformation.movedSurface(),
+                {{names::kDisplacementField, deformation.displacements().colwise().norm()},
+                 {names::kConfidenceField, deformation.confidence(organ.cloud.points)}},
+                organ, header);
+  attempt.rigid = toMessage(deformation.moveRigidly(organ.cloud.points), {}, organ, header);
 }
 
 Pipeline::Start Pipeline::chooseStart(const Job& job,

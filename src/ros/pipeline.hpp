@@ -53,6 +53,7 @@ class Pipeline {
   void attempt(const Job& job, const Attempt* accepted, ros::Time now, Attempt& attempt);
   void checkMessages(const Job& job, ros::Time now) const;
   Eigen::Isometry3d placeCloud(const Job& job, const std::string& fixed_frame);
+  std::optional<Eigen::Vector3f> placeSensor(const std_msgs::Header& cloud) const;
   Start chooseStart(const Job& job, const std::optional<geometry_msgs::PoseStamped>& guess,
                     const Attempt* accepted, const Eigen::Isometry3d& T_cloud_fixed) const;
   Eigen::Isometry3d placeGuess(const geometry_msgs::PoseStamped& guess,

@@ -57,7 +57,8 @@ void deformPoints(const DeformPointsRequest& request, const Acceptance::State& s
   for (std::size_t i = 0; i < request.points.size(); ++i) {
     points.col(static_cast<Eigen::Index>(i)) = toPoint(request.points[i], i);
   }
-  const Points moved = state.attempt->deformation->move(points);
+  const Deformation& deformation = *state.attempt->deformation;
+  const Points moved = deformation.move(points);
   response.points.resize(request.points.size());
   for (std::size_t i = 0; i < response.points.size(); ++i) {
     const auto point = moved.col(static_cast<Eigen::Index>(i));
@@ -65,6 +66,8 @@ void deformPoints(const DeformPointsRequest& request, const Acceptance::State& s
     response.points[i].y = point.y();
     response.points[i].z = point.z();
   }
+  const Eigen::RowVectorXf confidence = deformation.confidence(points);
+  response.confidence.assign(confidence.begin(), confidence.end());
   response.message = "moved by registration " + std::to_string(result.id);
 }
 

@@ -180,6 +180,24 @@ Points pointsOf(const sensor_msgs::PointCloud2& cloud) {
   return fromMessage(cloud, "received").cloud.points;
 }
 
+int fieldIndex(const sensor_msgs::PointCloud2& cloud, const std::string& field) {
+  for (const auto& known : cloud.fields) {
+    if (known.name != field) continue;
+    EXPECT_EQ(known.datatype, sensor_msgs::PointField::FLOAT32);
+    return static_cast<int>(known.offset / sizeof(float));
+  }
+  return -1;
+}
+
+Eigen::RowVectorXf valuesOf(const sensor_msgs::PointCloud2& cloud, const std::string& field) {
+  const int index = fieldIndex(cloud, field);
+  EXPECT_GE(index, 0) << "there is no field " << field;
+  if (index < 0) return {};
+  const auto* numbers = reinterpret_cast<const float*>(cloud.data.data());
+  const auto rows = static_cast<Eigen::Index>(cloud.point_step / sizeof(float));
+  return Eigen::Map<const Eigen::MatrixXf>(numbers, rows, cloud.width).row(index);
+}
+
 Eigen::Isometry3d poseOf(const geometry_msgs::Transform& transform) {
   return tf2::transformToEigen(transform);
 }

@@ -90,6 +90,11 @@ RegisterRequest requestWith(const sensor_msgs::PointCloud2& organ,
 /// x y z of a cloud, as received.
 Points pointsOf(const sensor_msgs::PointCloud2& cloud);
 
+/// Place of a field in each point of a cloud as the node publishes it, counted in floats; -1: it
+/// has none of that name. And its values.
+int fieldIndex(const sensor_msgs::PointCloud2& cloud, const std::string& field);
+Eigen::RowVectorXf valuesOf(const sensor_msgs::PointCloud2& cloud, const std::string& field);
+
 Eigen::Isometry3d poseOf(const geometry_msgs::Transform& transform);
 
 }  // namespace unirit::test

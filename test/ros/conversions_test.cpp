@@ -170,22 +170,39 @@ TEST(ToMessage, keepsOrderAndCountWithDroppedPointsAsNan) {
   Eigen::MatrixXd points = threePoints();
   points(0, 1) = kNan;
   const ReceivedCloud source = fromMessage(message(points, MessageLayout()), "cloud");
-  const Points displacements = 2.0F * source.cloud.points;
+  const Eigen::RowVector3f depths(0.25F, 0.5F, 0.75F);
   const PointCloud2 written =
-      toMessage(source.cloud.points, displacements, source, std_msgs::Header());
+      toMessage(source.cloud.points, {{"depth", depths}}, source, std_msgs::Header());
   EXPECT_EQ(written.width * written.height, 4U);
   EXPECT_FALSE(written.is_dense);
-  EXPECT_EQ(written.fields.back().name, "displacement");
   const auto* numbers = reinterpret_cast<const float*>(written.data.data());
-  EXPECT_TRUE(std::isnan(numbers[4]));
+  EXPECT_TRUE(std::isnan(numbers[4]) && std::isnan(numbers[7]));
   EXPECT_EQ(numbers[8], source.cloud.points(0, 1));
-  EXPECT_FLOAT_EQ(numbers[11], displacements.col(1).norm());
+  EXPECT_EQ(numbers[11], depths[1]);
+}
+
+TEST(ToMessage, writesValuesInTheirOrderAndLeavesOutWhatIsNotKnown) {
+  const ReceivedCloud source = fromMessage(message(threePoints(), MessageLayout()), "cloud");
+  const Eigen::RowVectorXf depths = source.cloud.points.row(2), none;
+  const PointCloud2 written =
+      toMessage(source.cloud.points, {{"none", none}, {"depth", depths}, {"less", -depths}}, source,
+                std_msgs::Header());
+  ASSERT_EQ(written.fields.size(), 5U);
+  EXPECT_EQ(written.fields[3].name, "depth");
+  EXPECT_EQ(written.fields[4].name, "less");
+  EXPECT_EQ(written.fields[4].offset, 16U);
+  EXPECT_EQ(written.point_step, 20U);
+  const auto* numbers = reinterpret_cast<const float*>(written.data.data());
+  for (Eigen::Index i = 0; i < depths.size(); ++i) {
+    EXPECT_EQ(numbers[5 * i + 3], depths[i]);
+    EXPECT_EQ(numbers[5 * i + 4], -depths[i]);
+  }
 }
 
 TEST(ToMessage, isReadBackUnchanged) {
   const ReceivedCloud source = fromMessage(message(threePoints(), MessageLayout()), "cloud");
   const PointCloud2 written =
-      toMessage(source.cloud.points, Points(3, 0), source, std_msgs::Header());
+      toMessage(source.cloud.points, std::vector<PointValues>(), source, std_msgs::Header());
   EXPECT_EQ(fromMessage(written, "cloud").cloud.points, source.cloud.points);
 }
 

@@ -46,7 +46,8 @@ const std::vector<BadCloud>& badClouds() {
       {"planar", "is planar", [] { return seenThen([](Points& p) { p.row(2).fill(0.5F); }); }},
       {"collinear", "is collinear",
        [] { return seenThen([](Points& p) { p.bottomRows<2>().fill(0.5F); }); }},
-      {"millimetres", "in millimetres", [] { return seenThen([](Points& p) { p *= 1000.0F; }); }},
+      {"millimetres", "is it in millimetres",
+       [] { return seenThen([](Points& p) { p *= 1000.0F; }); }},
       {"wrongType", "neither FLOAT32 nor FLOAT64",
        [] { return messageThen([](auto& m) { m.fields[0].datatype = 2; }); }},
       {"wrongSize", "bytes of data",
@@ -108,7 +109,7 @@ TEST_F(Node, invalidPreoperativePointsKeepTheirPlaceInTheOutput) {
   EXPECT_EQ(response.deformed.width, organ().cols());
   EXPECT_EQ(pointsOf(response.deformed).cols(), organ().cols() - 1);
   const auto* numbers = reinterpret_cast<const float*>(response.deformed.data.data());
-  EXPECT_TRUE(std::isnan(numbers[4 * 5]));
+  EXPECT_TRUE(std::isnan(numbers[5 * 5]));
 }
 
 TEST_F(Node, guessInAnUnknownFrameIsRefusedNamingBothFrames) {

@@ -70,10 +70,24 @@ TEST_F(Node, deformedIsRigidPlusItsDisplacement) {
   client().look([&] {
     const Points deformed = pointsOf(client().deformed), rigid = pointsOf(client().rigid);
     ASSERT_EQ(deformed.cols(), rigid.cols());
-    const auto* numbers = reinterpret_cast<const float*>(client().deformed.data.data());
-    for (Eigen::Index i = 0; i < deformed.cols(); ++i) {
-      EXPECT_NEAR(numbers[4 * i + 3], (deformed.col(i) - rigid.col(i)).norm(), 1e-6);
-    }
+    const Eigen::RowVectorXf displacements = valuesOf(client().deformed, "displacement");
+    EXPECT_LT((displacements - (deformed - rigid).colwise().norm()).cwiseAbs().maxCoeff(), 1e-6F);
+  });
+}
+
+TEST_F(Node, deformedIsSurestOfWhatTheCameraSaw) {
+  ASSERT_TRUE(waitForClouds());
+  client().look([&] {
+    const Eigen::RowVectorXf confidence = valuesOf(client().deformed, "confidence");
+    ASSERT_EQ(confidence.size(), organ().cols());
+    EXPECT_GE(confidence.minCoeff(), 0.0F);
+    EXPECT_LE(confidence.maxCoeff(), 1.0F);
+    const Points deformed = pointsOf(client().deformed);
+    Eigen::Index nearest = 0, farthest = 0;
+    deformed.row(2).minCoeff(&nearest);
+    deformed.row(2).maxCoeff(&farthest);
+    EXPECT_GT(confidence[nearest], confidence[farthest] + 0.1F);
+    EXPECT_EQ(fieldIndex(client().rigid, "confidence"), -1);
   });
 }
 
@@ -132,6 +146,18 @@ TEST_F(Node, deformPointsMovesTheSurfaceAsPublished) {
     const Eigen::Vector3f expected = deformed.col(static_cast<Eigen::Index>(i));
     EXPECT_LT((Eigen::Vector3d(p.x, p.y, p.z) - expected.cast<double>()).norm(), 1e-6);
   }
+}
+
+TEST_F(Node, deformPointsIsAsSureAsTheCloudAndNotOfWhatIsFar) {
+  Points points(3, organ().cols() + 1);
+  points << organ(), Eigen::Vector3f(0.0F, 0.0F, 5.0F);
+  const auto answer = client().callDeformPoints(kOrganFrame, points);
+  const Eigen::RowVectorXf published = valuesOf(accepted_.deformed, "confidence");
+  ASSERT_EQ(answer.confidence.size(), static_cast<std::size_t>(points.cols()));
+  for (Eigen::Index i = 0; i < published.size(); ++i) {
+    EXPECT_NEAR(answer.confidence[static_cast<std::size_t>(i)], published[i], 1e-4);
+  }
+  EXPECT_LT(answer.confidence.back(), 1e-3);
 }
 
 TEST_F(Node, deformPointsRefusesOtherFramesAndPointsThatAreNotFinite) {

@@ -45,13 +45,16 @@ class SettingsYaml : public ::testing::Test {
 TEST_F(SettingsYaml, ReadsNestedAndJoinedKeys) {
   const RegistrationSettings settings = read(
       "threads: 3\nstages: rigid\nplausibility: {min_points: 70, max_residual: 1}\n"
-      "sampling/points: 256\nnetwork:\n  pairing: none\n");
+      "sampling/points: 256\nnetwork:\n  pairing: none\n"
+      "refinement: {correspondence: points, last_sigma: 0.03}\n");
   EXPECT_EQ(settings.threads, 3);
   EXPECT_EQ(settings.stages, std::vector<Stage>{Stage::kRigid});
   EXPECT_EQ(settings.plausibility.min_points, 70);
   EXPECT_EQ(settings.plausibility.max_residual, 1.0);
   EXPECT_EQ(settings.sampling.points, 256);
   EXPECT_EQ(settings.network.pairing, Pairing::kNone);
+  EXPECT_EQ(settings.refinement.correspondence, Correspondence::kPoints);
+  EXPECT_EQ(settings.refinement.last_sigma, 0.03);
 }
 
 TEST_F(SettingsYaml, KeepsWhatTheFileDoesNotName) {
@@ -79,7 +82,9 @@ TEST_F(SettingsYaml, NamesTheKeyThatIsWrong) {
   expectRefusal("plausibility: {max_residual: 2}\n", "plausibility/max_residual: 2 is outside");
   expectRefusal("plausibility: {max_residual: .nan}\n", "plausibility/max_residual");
   expectRefusal("threads: 0\n", "threads: 0 is outside");
-  expectRefusal("stages: rigid,refine\n", "refine");
+  expectRefusal("stages: refine,rigid\n", "out of order");
+  expectRefusal("refinement: {correspondence: lines}\n", "unknown correspondence 'lines'");
+  expectRefusal("refinement: {iterations: 0}\n", "refinement/iterations: 0 is outside");
   expectRefusal("network: {pairing: closest}\n", "closest");
   expectRefusal("threads: 2\nplausibility/min_points: 9\nplausibility: {min_points: 8}\n",
                 "plausibility/min_points stands twice");
