@@ -86,7 +86,8 @@ def compare(program, cases, folder):
           " | ".join(f"{iterations} iterations" for iterations in ITERATIONS) + " |")
     print("|---" * (2 + len(ITERATIONS)) + "|")
     worst = 0.0
-    runs = [("cpd-rigid", s) for s in CPD] + [("cpd", s) for s in CPD] + [("bcpd", s) for s in BCPD]
+    runs = ([("cpd-rigid", {"w": s["w"]}) for s in CPD] + [("cpd", s) for s in CPD] +
+            [("bcpd", s) for s in BCPD])
     for method, settings in runs:
         largest = dict.fromkeys(ITERATIONS, 0.0)
         for case in cases:

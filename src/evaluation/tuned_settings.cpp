@@ -28,11 +28,11 @@ constexpr std::array<CpdRow, 5> kRigidCpd{{{2.0, 2.0, 0.7, true},
                                            {2.0, 2.0, 0.7, true},
                                            {2.0, 2.0, 0.7, false},
                                            {2.0, 2.0, 0.7, false}}};
-constexpr std::array<CpdRow, 5> kCpd{{{0.7, 20.0, 0.01, false},
-                                      {1.5, 100.0, 0.7, false},
-                                      {2.5, 20.0, 0.7, false},
-                                      {2.5, 100.0, 0.01, false},
-                                      {2.5, 100.0, 0.7, false}}};
+constexpr std::array<CpdRow, 5> kCpd{{{0.7, 20.0, 0.01, true},
+                                      {0.7, 500.0, 0.7, false},
+                                      {2.5, 20.0, 0.7, true},
+                                      {0.7, 2000.0, 0.01, false},
+                                      {2.5, 500.0, 0.01, false}}};
 
 struct BcpdRow {
   double beta, lambda, omega, gamma;
@@ -40,9 +40,9 @@ struct BcpdRow {
 };
 constexpr std::array<BcpdRow, 5> kBcpd{{{1.5, 5.0, 0.3, 1.0, true, false},
                                         {2.5, 20.0, 0.3, 0.3, false, false},
-                                        {1.5, 100.0, 0.3, 1.0, true, false},
-                                        {2.5, 100.0, 0.0, 0.1, true, false},
-                                        {2.5, 100.0, 0.0, 0.1, true, false}}};
+                                        {1.0, 500.0, 0.1, 1.0, true, true},
+                                        {1.0, 500.0, 0.3, 0.1, true, false},
+                                        {0.7, 2000.0, 0.1, 0.1, true, false}}};
 
 /// The protocol's row. `paired` is `permuted` in another sequence, which no rival sees; `offset` is
 /// `caseb` with centroids that must be brought together.
