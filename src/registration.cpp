@@ -15,6 +15,8 @@
 namespace unirit {
 namespace {
 
+constexpr double kClearlyBetter = 0.25;  // of Refined::fit, found on training organs
+
 PointCloud dropInvalid(const PointCloud& cloud) {
   std::vector<Eigen::Index> valid;
   for (Eigen::Index i = 0; i < cloud.size(); ++i) {
@@ -151,10 +153,11 @@ Registration Registrar::Implementation::run(const PointCloud& preoperative,
     });
   }
 
+  // Refinement from the guess and from where the network left the organ
   std::optional<Refined> refined;
   if (refines) {
     timed("refine", stages, [&] { refined = refine(target, rigid, displacements); });
-    rigid = rigid * refined->pose;
+    rigid = refined->pose;
   }
 
   timed("assessment", stages, [&] {
@@ -185,13 +188,23 @@ PointCloud Registrar::Implementation::sample(const PointCloud& cloud,
   return sampled;
 }
 
-/// Starts from where the network left the organ.
+/// The refinement from the guess, or from where the network left the organ if that fits clearly
+/// better: a wrong pose of a part of the organ fits almost as well as the right one.
 Refined Registrar::Implementation::refine(const PointCloud& target, const Eigen::Isometry3f& rigid,
                                           const Points& displacements) {
-  const Eigen::Isometry3f to_start = rigid.inverse();
-  PointCloud seen{to_start * target.points, {}};
-  if (target.viewpoint) seen.viewpoint = to_start * *target.viewpoint;
-  return model->refinement->refine(seen, to_start.linear() * displacements);
+  const auto refineFrom = [&](const Eigen::Isometry3f& start, const Points& moved) {
+    const Eigen::Isometry3f to_start = start.inverse();
+    PointCloud seen{to_start * target.points, {}};
+    if (target.viewpoint) seen.viewpoint = to_start * *target.viewpoint;
+    Refined refined = model->refinement->refine(seen, to_start.linear() * moved);
+    refined.pose = start * refined.pose;
+    return refined;
+  };
+  Refined from_guess =
+      refineFrom(Eigen::Isometry3f::Identity(), Points::Zero(3, model->sampled.size()));
+  if (settings.stages.front() == Stage::kRefine) return from_guess;
+  Refined from_network = refineFrom(rigid, displacements);
+  return from_network.fit > from_guess.fit + kClearlyBetter ? from_network : from_guess;
 }
 
 Eigen::Isometry3d Registrar::Implementation::toMetres(const Eigen::Isometry3f& pose) const {

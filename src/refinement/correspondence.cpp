@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "correspondence.hpp"
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <numeric>
@@ -12,7 +13,8 @@ constexpr float kReach = 4.0F;           // affinities beyond so many sigma are 
 constexpr long kChunk = 64;              // source points to a chunk, whatever the number of threads
 constexpr float kFarAway = 1e6F;         // where the padding lies
 constexpr float kSourceOutliers = 0.1F;  // background of the source's side over the target's
-constexpr float kFlatVolume = 1e-2F;     // added to each side of the bounding box
+constexpr float kBoxVariance = 12.0F;    // side^2 over variance of a uniformly filled box
+constexpr float kFlatVariance = 1e-4F;   // no target is flatter
 
 /// Sorts indices so that every kPointBlock of them lie close together: halves along the longest
 /// side until a block is left.
@@ -70,9 +72,10 @@ CorrespondenceEstimator::CorrespondenceEstimator(const PointCloud& target, const
     blocks_.push_back({centre, (members.colwise() - centre).colwise().norm().maxCoeff()});
   }
   for (Nearby& nearby : nearby_) nearby.blocks.resize(blocks_.size());
-  const Eigen::Vector3f sides =
-      target.points.rowwise().maxCoeff() - target.points.rowwise().minCoeff();
-  volume_ = (sides.array() + kFlatVolume).prod();
+  const Points centred = target.points.colwise() - centroid(target.points);
+  Eigen::Matrix3f covariance = centred * centred.transpose() / static_cast<float>(target_count_);
+  covariance.diagonal().array() += kFlatVariance;
+  volume_ = std::sqrt(kBoxVariance * kBoxVariance * kBoxVariance * covariance.determinant());
 }
 
 float* CorrespondenceEstimator::row(int index) { return targets_.data() + index * padded_; }
@@ -120,6 +123,21 @@ void CorrespondenceEstimator::sumAffinities(const PointCloud& source, float reac
   }
 }
 
+/// From the sums of the affinities, while the target weights still are those.
+double CorrespondenceEstimator::fit(const Eigen::RowVectorXf& visibility, float target_background,
+                                    float source_background) const {
+  double target = 0.0, source = 0.0, visible = 0.0;
+  for (long j = 0; j < target_count_; ++j) {
+    target += std::log(target_weights_.data()[j] + target_background);
+  }
+  for (Eigen::Index i = 0; i < visibility.size(); ++i) {
+    source +=
+        visibility[i] * std::log(source_sums_[static_cast<std::size_t>(i)] + source_background);
+    visible += visibility[i];
+  }
+  return target / static_cast<double>(target_count_) + source / std::max(visible, 1.0);
+}
+
 void CorrespondenceEstimator::estimate(const PointCloud& source,
                                        const Eigen::RowVectorXf& visibility,
                                        const Attraction& attraction,
@@ -132,10 +150,12 @@ void CorrespondenceEstimator::estimate(const PointCloud& source,
   const float spread = 2.0F * static_cast<float>(M_PI) * attraction.sigma * attraction.sigma;
   const float background = attraction.outlier_share / (1.0F - attraction.outlier_share) * spread *
                            std::sqrt(spread) / volume_;
+  const float target_background = background * static_cast<float>(source.size());
+  const float source_background = kSourceOutliers * background * static_cast<float>(target_count_);
+  correspondences.fit = fit(visibility, target_background, source_background);
   const float target_share = 1.0F / (1.0F + attraction.symmetry);
   Eigen::Map<Eigen::ArrayXf> target_weights(target_weights_.data(), padded_);
-  target_weights = target_share / (target_weights + background * static_cast<float>(source.size()));
-  const float source_background = kSourceOutliers * background * static_cast<float>(target_count_);
+  target_weights = target_share / (target_weights + target_background);
 
   correspondences.mass.resize(source.size());
   correspondences.positions.resize(3, source.size());

@@ -24,6 +24,8 @@ struct Correspondences {
   Eigen::RowVectorXf mass;  ///< N, sum of the responsibilities
   Points positions;         ///< 3 x N, mean target point; the source's own where the mass is zero
   Points normals;           ///< 3 x N, mean target normal, a unit vector or zero
+  double fit =
+      0.0;  ///< mean log likelihood of target and of visible source points, up to constants
 };
 
 /// Soft correspondences of a moving source with a target that stays: the expectation step of
@@ -51,6 +53,8 @@ class CorrespondenceEstimator {
   };
 
   void findNearby(const Eigen::Vector3f& point, float reach, Nearby& nearby) const;
+  double fit(const Eigen::RowVectorXf& visibility, float target_background,
+             float source_background) const;
   void sumAffinities(const PointCloud& source, float reach, const AffinityView& affinity);
   OrientedPointsView view() const;
   float* row(int index);
@@ -60,7 +64,7 @@ class CorrespondenceEstimator {
   long target_count_;
   long padded_;            // to whole blocks
   AlignedFloats targets_;  // six rows: x, y, z, normal x, y, z
-  float volume_;           // of the target's bounding box
+  float volume_;           // of a box with the target's principal variances
   std::vector<Block> blocks_;
   std::vector<Nearby> nearby_;  // one a thread
   AlignedFloats chunk_sums_;    // one row a chunk of source points

@@ -18,6 +18,7 @@ constexpr float kWidestSigma = 0.4F;    // where the pose alone is sought
 constexpr float kFirstSigma = 0.12F;    // where the displacement joins it
 constexpr float kSurfaceAcross = 0.2F;  // deviation along the surface, which geometry hardly sees
 constexpr float kPointsAcross = 0.01F;
+constexpr int kPointsPatience = 2;  // times the iterations: points are told apart late
 constexpr float kSurfaceWeight = 0.3F;
 // Mean normal of a surface seen from all sides, at most; a viewpoint speaks for one side
 constexpr double kWholeOpenness = 0.25;
@@ -99,12 +100,14 @@ Refined Refinement::refine(const PointCloud& target, const Points& displacements
     expect(sigma);
     solver_.solvePose(correspondences_, trust(sigma, 0.0F), state);
   }
-  for (int step = 0; step < settings_.iterations; ++step) {
-    const float sigma = annealed(kFirstSigma, last, step, settings_.iterations * 4 / 5);
+  const int steps = points ? kPointsPatience * settings_.iterations : settings_.iterations;
+  for (int step = 0; step < steps; ++step) {
+    const float sigma = annealed(kFirstSigma, last, step, steps * 4 / 5);
     expect(sigma);
     solver_.solve(correspondences_, trust(sigma, points ? kPointsAcross : kSurfaceAcross), state);
   }
-  return {state.pose, state.coefficients, solver_.covarianceFactor(), whole};
+  expect(last);
+  return {state.pose, state.coefficients, solver_.covarianceFactor(), whole, correspondences_.fit};
 }
 
 }  // namespace unirit

@@ -17,6 +17,7 @@ struct Refined {
   Eigen::Matrix3Xf coefficients;      ///< 3 x rank
   Eigen::MatrixXf covariance_factor;  ///< CoherentSolver::covarianceFactor
   bool whole = false;                 ///< the target was taken for the whole surface
+  double fit = 0.0;                   ///< Correspondences::fit at the end
 };
 
 /// The coherent refinement: expectation maximisation of pose and smooth displacement, annealed from
