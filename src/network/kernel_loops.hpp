@@ -147,8 +147,8 @@ struct Loops {
     }
   }
 
-  /// e^x for x <= 0, to a relative 1e-6; zero below -87. By e^x = 2^n e^r, |r| <= ln 2 / 2, and the
-  /// Taylor series of e^r.
+  /// e^x for x <= 0, to a relative 5e-6 (1e-6 above -20); zero below -87. By e^x = 2^n e^r,
+  /// |r| <= ln 2 / 2, and the Taylor series of e^r.
   static Vector exponential(Vector x) {
     const Vector lowest = -87.0F - Vector{};
     const IndexVector underflows = x < lowest;
