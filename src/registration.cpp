@@ -15,7 +15,9 @@
 namespace unirit {
 namespace {
 
-constexpr double kClearlyBetter = 0.25;  // of Refined::fit, found on training organs
+// Of Refined::fit, found on training organs; any pose of a part of the organ fits almost as well
+constexpr double kClearlyBetterView = 0.5;
+constexpr double kClearlyBetterWhole = 0.2;
 
 PointCloud dropInvalid(const PointCloud& cloud) {
   std::vector<Eigen::Index> valid;
@@ -189,7 +191,7 @@ PointCloud Registrar::Implementation::sample(const PointCloud& cloud,
 }
 
 /// The refinement from the guess, or from where the network left the organ if that fits clearly
-/// better: a wrong pose of a part of the organ fits almost as well as the right one.
+/// better.
 Refined Registrar::Implementation::refine(const PointCloud& target, const Eigen::Isometry3f& rigid,
                                           const Points& displacements) {
   const auto refineFrom = [&](const Eigen::Isometry3f& start, const Points& moved) {
@@ -204,7 +206,8 @@ Refined Registrar::Implementation::refine(const PointCloud& target, const Eigen:
       refineFrom(Eigen::Isometry3f::Identity(), Points::Zero(3, model->sampled.size()));
   if (settings.stages.front() == Stage::kRefine) return from_guess;
   Refined from_network = refineFrom(rigid, displacements);
-  return from_network.fit > from_guess.fit + kClearlyBetter ? from_network : from_guess;
+  const double margin = from_guess.whole ? kClearlyBetterWhole : kClearlyBetterView;
+  return from_network.fit > from_guess.fit + margin ? from_network : from_guess;
 }
 
 Eigen::Isometry3d Registrar::Implementation::toMetres(const Eigen::Isometry3f& pose) const {

@@ -46,8 +46,8 @@ class CoherentSolver {
   /// Moves pose and displacement.
   void solve(const Correspondences& correspondences, const Trust& trust, CoherentState& state);
 
-  /// Forgets what was learnt of the pose's deviations.
-  void restart() { deviations_ = prior_; }
+  /// Forgets what was learnt of the pose's deviations, begins anew from these.
+  void restart(const PosePrior& prior) { prior_ = deviations_ = prior; }
 
   /// After solve: F such that the coefficients of axis a have the covariance F_a^T F_a, where F_a
   /// are the columns from a * rank on; (3 rank + 6) x 3 rank.

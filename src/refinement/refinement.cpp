@@ -13,7 +13,9 @@ namespace {
 constexpr double kPriorLength = 0.4;
 constexpr double kPriorAmplitude = 0.087;
 constexpr int kRank = 48;
-constexpr PosePrior kPosePrior{0.1F, 0.05F};
+// A view tells little of the pose, a whole surface nearly all
+constexpr PosePrior kViewPose{0.07F, 0.035F};
+constexpr PosePrior kWholePose{0.2F, 0.1F};
 constexpr float kWidestSigma = 0.4F;    // where the pose alone is sought
 constexpr float kFirstSigma = 0.12F;    // where the displacement joins it
 constexpr float kSurfaceAcross = 0.2F;  // deviation along the surface, which geometry hardly sees
@@ -43,7 +45,7 @@ Refinement::Refinement(const PointCloud& source, const RefinementSettings& setti
       team_(team),
       prior_(std::make_shared<const DisplacementPrior>(source.points, kPriorLength, kPriorAmplitude,
                                                        kRank)),
-      solver_(source.points, prior_->functions(source.points), kPosePrior, kernels, team) {}
+      solver_(source.points, prior_->functions(source.points), kViewPose, kernels, team) {}
 
 void Refinement::move(const CoherentState& state) {
   moved_.points = state.pose * (source_.points + state.displacements);
@@ -81,7 +83,7 @@ Refined Refinement::refine(const PointCloud& target, const Points& displacements
     attraction.normals = NormalUse::kNone;
     attraction.symmetry = 0.0F;
   }
-  solver_.restart();
+  solver_.restart(whole ? kWholePose : kViewPose);
   CoherentState state{Eigen::Isometry3f::Identity(), Eigen::Matrix3Xf::Zero(3, solver_.rank()),
                       displacements};
   const auto expect = [&](float sigma) {

@@ -180,7 +180,7 @@ TEST_F(CoherentSolving, RestartForgetsAndThreadsDoNotMatter) {
       if (first.displacements.cols() == 0) first = state;
       EXPECT_EQ(state.pose.matrix(), first.pose.matrix());
       EXPECT_EQ(state.coefficients, first.coefficients);
-      fast.restart();
+      fast.restart(kPrior);
     }
     CoherentState again = start();
     fast.solve(seen_, kTrust, again);
