@@ -263,7 +263,7 @@ TEST_F(RegisterTool, TurnsOrgansThatAreInsideOut) {
       " seen.ply --weights weights.safetensors --settings settings.yaml --output out";
   ASSERT_EQ(run("inside_out.ply" + others), 0);
   EXPECT_EQ(readSurface(at("out/deformed.ply"), kMillimetre).surface.faces, organ.faces);
-  EXPECT_EQ(points("deformed.ply"), usual);
+  EXPECT_LT((points("deformed.ply") - usual).cwiseAbs().maxCoeff(), 1e-5F);
 }
 
 TEST_F(RegisterTool, EstimatesTheNormalsOfABareCloud) {
