@@ -31,13 +31,17 @@ std::vector<std::vector<Eigen::Index>> neighbourGraph(const Points& points) {
   return graph;
 }
 
-/// Carries the sign of the root's normal to all points that can be reached from it.
-void propagate(Eigen::Index root, const std::vector<std::vector<Eigen::Index>>& graph,
-               Points& normals, std::vector<bool>& oriented) {
+/// Carries the sign of the root's normal to all points that can be reached from it; which these
+/// are.
+std::vector<Eigen::Index> propagate(Eigen::Index root,
+                                    const std::vector<std::vector<Eigen::Index>>& graph,
+                                    Points& normals, std::vector<bool>& oriented) {
+  std::vector<Eigen::Index> piece;
   using Edge = std::tuple<float, Eigen::Index, Eigen::Index>;  // agreement, from, to
   std::priority_queue<Edge> edges;
   const auto reach = [&](Eigen::Index i) {
     oriented[static_cast<std::size_t>(i)] = true;
+    piece.push_back(i);
     for (const Eigen::Index j : graph[static_cast<std::size_t>(i)]) {
       if (!oriented[static_cast<std::size_t>(j)])
         edges.emplace(std::abs(normals.col(i).dot(normals.col(j))), i, j);
@@ -51,6 +55,7 @@ void propagate(Eigen::Index root, const std::vector<std::vector<Eigen::Index>>& 
     if (normals.col(from).dot(normals.col(to)) < 0.0F) normals.col(to) *= -1.0F;
     reach(to);
   }
+  return piece;
 }
 
 }  // namespace
@@ -104,16 +109,14 @@ Points vertexNormals(const Surface& mesh) {
 void orientOutwards(const Points& points, Points& normals) {
   const auto graph = neighbourGraph(points);
   const Points offsets = points.colwise() - centroid(points);
-  Eigen::RowVectorXf remaining = offsets.colwise().squaredNorm();
   std::vector<bool> oriented(static_cast<std::size_t>(points.cols()), false);
-  for (;;) {
-    Eigen::Index root = 0;
-    if (remaining.maxCoeff(&root) < 0.0F) return;
-    if (normals.col(root).dot(offsets.col(root)) < 0.0F) normals.col(root) *= -1.0F;
-    propagate(root, graph, normals, oriented);
-    for (Eigen::Index i = 0; i < points.cols(); ++i) {
-      if (oriented[static_cast<std::size_t>(i)]) remaining[i] = -1.0F;
-    }
+  for (Eigen::Index root = 0; root < points.cols(); ++root) {
+    if (oriented[static_cast<std::size_t>(root)]) continue;
+    const std::vector<Eigen::Index> piece = propagate(root, graph, normals, oriented);
+    double outwards = 0.0;
+    for (const Eigen::Index i : piece) outwards += normals.col(i).dot(offsets.col(i));
+    if (outwards >= 0.0) continue;
+    for (const Eigen::Index i : piece) normals.col(i) *= -1.0F;
   }
 }
 

@@ -18,8 +18,9 @@ void turnFacesOutwards(Surface& mesh);
 Points vertexNormals(const Surface& mesh);
 
 /// Turns the normals to the same side of the surface as their neighbours', along the neighbours
-/// that agree best (Hoppe et al. 1992), and outwards at the point farthest from the centroid.
-/// Surfaces in several pieces are oriented piece by piece.
+/// that agree best (Hoppe et al. 1992), and away from the centroid on the whole: outwards where the
+/// surface is closed, and on the convex side of a part of it. Piece by piece where there are
+/// several.
 void orientOutwards(const Points& points, Points& normals);
 
 /// Turns every normal to the half space of the viewpoint (same frame and unit as the points).

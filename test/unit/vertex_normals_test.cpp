@@ -3,6 +3,8 @@
 
 #include "shapes.hpp"
 #include "unirit/normals.hpp"
+#include "unirit/sampling.hpp"
+#include "unirit/simulation/depth_camera.hpp"
 #include "unirit/simulation/phantom.hpp"
 
 namespace unirit {
@@ -66,6 +68,31 @@ TEST(TurnFacesOutwards, JudgesFarFromTheOrigin) {
   far.vertices.points.colwise() += Eigen::Vector3f(3.0F, -2.0F, 5.0F);
   turnFacesOutwards(far);
   EXPECT_EQ(outwardShare(far), 1.0);
+}
+
+/// Mean cosine of the normals with the rays to the eye.
+float agreement(const Points& points, const Points& normals, const Eigen::Vector3f& eye) {
+  const Points rays = ((-points).colwise() + eye).colwise().normalized();
+  return normals.cwiseProduct(rays).colwise().sum().mean();
+}
+
+TEST(OrientOutwards, TurnsViewsOfOrgansTowardsTheCameraThatSawThem) {
+  for (const std::string& organ : phantomOrgans()) {
+    const Surface mesh = makePhantom(organ, 1, 4000);
+    for (std::uint64_t seed = 0; seed < 6; ++seed) {
+      Random random(seed);
+      const Eigen::Vector3d eye = 0.6 * random.direction();
+      DepthCamera camera;
+      camera.width = 160;
+      camera.height = 120;
+      const Eigen::Vector3d up = random.direction();
+      const PointCloud seen = renderDepth(mesh, lookAt(eye, {0, 0, 0}, up).inverse(), camera, seed);
+      const Points points = select(seen.points, sampleEvenly(seen.points, 1024));
+      Points normals = estimateNormals(points);
+      orientOutwards(points, normals);
+      EXPECT_GT(agreement(points, normals, Eigen::Vector3f::Zero()), 0.2F) << organ << ' ' << seed;
+    }
+  }
 }
 
 }  // namespace
