@@ -54,14 +54,11 @@ inline long countAllocations(const std::function<void()>& work) {
   return allocations - before;
 }
 
-/// Skips where another allocator's calls are not counted.
-class AllocationTest : public testing::Test {
- protected:
-  void SetUp() override {
+/// For SetUp: skips the test where another allocator's calls are not counted.
+inline void requireCounting() {
 #ifndef UNIRIT_COUNTS_ALLOCATIONS
-    GTEST_SKIP() << "this build has another allocator, whose calls are not counted";
+  GTEST_SKIP() << "this build has another allocator, whose calls are not counted";
 #endif
-  }
-};
+}
 
 }  // namespace unirit::test

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "refinement/coherent_solver.hpp"
 
-#include <gtest/gtest.h>
-
+#include "allocation_counter.hpp"
 #include "coherent_reference.hpp"
 #include "oriented_organ.hpp"
 #include "refinement/displacement_prior.hpp"
@@ -187,6 +186,25 @@ TEST_F(CoherentSolving, RestartForgetsAndThreadsDoNotMatter) {
     again = start();
     fast.solve(seen_, kTrust, again);  // without a restart: the deviations are learnt ones
     EXPECT_NE(again.coefficients, first.coefficients);
+  }
+}
+
+class CoherentSolvingAllocation : public CoherentSolving {
+ protected:
+  void SetUp() override { test::requireCounting(); }
+};
+
+TEST_F(CoherentSolvingAllocation, StepsAllocateNothingAfterTheFirst) {
+  for (const int threads : {1, 2}) {
+    ThreadTeam team(threads);
+    CoherentSolver fast = solver(team);
+    CoherentState state = start();
+    const auto step = [&] {
+      fast.solvePose(seen_, kTrust, state);
+      fast.solve(seen_, kTrust, state);
+    };
+    EXPECT_GT(test::countAllocations(step), 0) << "the first step sizes the buffers";
+    EXPECT_EQ(test::countAllocations(step), 0) << threads << " threads";
   }
 }
 

@@ -193,7 +193,10 @@ TEST(Correspondence, SourcePointsBeyondAllTargetsStayWhereTheyAre) {
   EXPECT_GT(found.mass.tail(250).minCoeff(), 0.0F);
 }
 
-class CorrespondenceAllocation : public test::AllocationTest {};
+class CorrespondenceAllocation : public testing::Test {
+ protected:
+  void SetUp() override { test::requireCounting(); }
+};
 
 TEST_F(CorrespondenceAllocation, NothingIsAllocatedAfterTheFirstCall) {
   const PointCloud moving = source(), seen = target(500);

@@ -7,7 +7,10 @@ namespace {
 
 using test::countAllocations;
 
-class NetworkAllocation : public test::AllocationTest {};
+class NetworkAllocation : public testing::Test {
+ protected:
+  void SetUp() override { test::requireCounting(); }
+};
 
 TEST_F(NetworkAllocation, theCounterCounts) {
   EXPECT_GT(countAllocations([] { Points(3, 1000).setZero(); }), 0);
