@@ -96,6 +96,7 @@ Header takeHeader(std::string_view& file) {
     if (keyword == "VIEWPOINT") {
       header.viewpoint.emplace();
       for (double& coordinate : *header.viewpoint) coordinate = toNumber(takeWord(line));
+      if (header.viewpoint->isZero()) header.viewpoint.reset();  // so does who knows of none
     }
     if (keyword == "DATA") header.data = takeWord(line);
   }

@@ -110,6 +110,13 @@ TEST_F(SurfaceIo, ReadsPcdWithItsViewpoint) {
   EXPECT_EQ(*file.viewpoint, Eigen::Vector3f(0.5F, -2.0F, 3.0F));
 }
 
+TEST_F(SurfaceIo, TakesAViewpointAtTheOriginForNone) {
+  std::string pcd = textPcd();
+  const std::string viewpoint = "0.5 -2 3 1";
+  pcd.replace(pcd.find(viewpoint), viewpoint.size(), "0 0 0 1");
+  EXPECT_FALSE(read("cloud.pcd", pcd).viewpoint);
+}
+
 TEST_F(SurfaceIo, ReadsWhatPclWrites) {
   pcl::PointCloud<pcl::PointNormal> cloud;
   for (int i = 0; i < 300; ++i) {

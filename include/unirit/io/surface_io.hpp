@@ -11,7 +11,9 @@ namespace unirit {
 /// A surface as read from a file.
 struct SurfaceFile {
   Surface surface;                           ///< in metres, vertices in the file's order
-  std::optional<Eigen::Vector3f> viewpoint;  ///< where the sensor stood, if a PCD says so [m]
+  /// Where the sensor stood, if a PCD says so [m]. Not the origin: that is what writers put who know
+  /// of no place.
+  std::optional<Eigen::Vector3f> viewpoint;
   Eigen::Index dropped = 0;                  ///< points that were not finite (faces go with them)
 };
 
