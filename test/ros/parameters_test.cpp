@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 #include <yaml-cpp/yaml.h>
 
+#include <fstream>
+#include <iterator>
 #include <map>
 #include <set>
 #include <string>
@@ -52,6 +54,18 @@ TEST(Settings, yamlAndStructHoldTheSameDefaults) {
   EXPECT_EQ(yaml["tf_rate"].as<double>(), node.tf_rate);
   EXPECT_EQ(yaml["tf_timeout"].as<double>(), node.tf_timeout);
   EXPECT_EQ(yaml.size(), 11U) << "a name in the file that nothing here compares";
+}
+
+TEST(Settings, readmeStatesTheSameDefaults) {
+  std::ifstream file(UNIRIT_README);
+  const std::string readme{std::istreambuf_iterator<char>(file), {}};
+  const RegistrationSettings settings;
+  visitSettings(settings, [&](const char* name, auto value, auto, auto, const char*) {
+    const std::string row = std::string("| `") + name + "` | ";
+    const auto found = readme.find(row);
+    ASSERT_NE(found, std::string::npos) << name << " has no row";
+    EXPECT_EQ(std::stod(readme.substr(found + row.size(), 20)), value) << name;
+  });
 }
 
 TEST(Settings, dynamicThresholdsAndStructHoldTheSameDefaultsAndRanges) {
