@@ -16,7 +16,7 @@ class CoherentField : public DisplacementField {
   /// CoherentSolver::covarianceFactor; `rotation`: pre-operative to intra-operative.
   CoherentField(std::shared_ptr<const DisplacementPrior> prior, const Normalisation& normalisation,
                 const Eigen::Matrix3f& rotation, const Eigen::Matrix3Xf& coefficients,
-                Eigen::MatrixXf covariance_factor);
+                const Eigen::MatrixXf& covariance_factor);
 
   Points displacements(const Points& preoperative) const override;
   Eigen::RowVectorXf confidence(const Points& preoperative) const override;
@@ -25,7 +25,7 @@ class CoherentField : public DisplacementField {
   std::shared_ptr<const DisplacementPrior> prior_;
   Normalisation normalisation_;
   Eigen::Matrix3Xf coefficients_;  // [m], intra-operative frame
-  Eigen::MatrixXf covariance_factor_;
+  Eigen::MatrixXf learnt_;  // covariance of the coefficients that the cloud took away, all axes
 };
 
 }  // namespace unirit
