@@ -81,8 +81,9 @@ TEST(Correspondence, TakeAnyNumberOfTargetPoints) {
   for (const int count : {1, 3, 15, 16, 17}) {
     SCOPED_TRACE(count);
     const PointCloud first{few.points.leftCols(count), few.normals.leftCols(count)};
-    expectNear(estimated(source(), first, wide(NormalUse::kUnsigned)),
-               expected(source(), first, wide(NormalUse::kUnsigned)), 2e-5);
+    for (const NormalUse use : {NormalUse::kNone, NormalUse::kUnsigned}) {
+      expectNear(estimated(source(), first, wide(use)), expected(source(), first, wide(use)), 2e-5);
+    }
   }
 }
 
