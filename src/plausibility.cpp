@@ -93,12 +93,20 @@ std::vector<PlausibilityCheck> checkOutput(const Registration& registration, dou
   const Eigen::Isometry3d& pose = registration.T_intraoperative_preoperative;
   const bool finite = pose.matrix().allFinite() && registration.deformation != nullptr &&
                       registration.deformation->displacements().allFinite();
-  return {PlausibilityCheck{"values that are not finite", finite ? 0.0 : 1.0, 0.0, finite},
-          atMost("rotation error", rotationError(pose), kRotationTolerance),
-          atMost("median surface residual over extent", registration.residual.median / organ_extent,
-                 settings.max_residual),
-          atMost("largest displacement over extent", registration.displacement.max / organ_extent,
-                 settings.max_displacement)};
+  std::vector<PlausibilityCheck> checks{
+      PlausibilityCheck{"values that are not finite", finite ? 0.0 : 1.0, 0.0, finite},
+      atMost("rotation error", rotationError(pose), kRotationTolerance),
+      atMost("median surface residual over extent", registration.residual.median / organ_extent,
+             settings.max_residual),
+      atMost("95th percentile of the surface residual over extent",
+             registration.residual.p95 / organ_extent, settings.max_residual_p95),
+      atMost("largest displacement over extent", registration.displacement.max / organ_extent,
+             settings.max_displacement)};
+  if (registration.refinement) {
+    checks.push_back(atMost("surprise of the displacement", registration.refinement->surprise,
+                            settings.max_surprise));
+  }
+  return checks;
 }
 
 std::vector<PlausibilityCheck> checkJump(const Eigen::Isometry3d& pose,

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "unirit/registration.hpp"
 
+#include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <exception>
 #include <stdexcept>
 #include <utility>
@@ -61,6 +63,13 @@ bool contains(const std::vector<Stage>& stages, Stage wanted) {
     if (stage == wanted) return true;
   }
   return false;
+}
+
+/// Of the prior's variance of 1 a coefficient, what is not left after the cloud was seen.
+double surprise(const Refined& refined) {
+  const auto prior = static_cast<double>(refined.coefficients.size());
+  const double learnt = prior - static_cast<double>(refined.covariance_factor.squaredNorm());
+  return refined.coefficients.norm() / std::sqrt(std::max(learnt, 1.0));
 }
 
 }  // namespace
@@ -161,6 +170,7 @@ Registration Registrar::Implementation::run(const PointCloud& preoperative,
   if (refines) {
     timed("refine", stages, [&] { refined = refine(target, rigid, displacements); });
     rigid = refined->pose;
+    registration.refinement = RefinementQuality{refined->fit, surprise(*refined)};
   }
 
   timed("assessment", stages, [&] {

@@ -27,7 +27,8 @@ std::optional<std::string> findMismatch(const PointCloud& preoperative,
                                         const PointCloud& intraoperative,
                                         const PlausibilitySettings& settings);
 
-/// Checks of a finished registration: finite, rotation valid, residual, displacement.
+/// Checks of a finished registration: finite, rotation valid, residual, displacement and, where it
+/// was refined, how surprising the displacement is.
 std::vector<PlausibilityCheck> checkOutput(const Registration& registration, double organ_extent,
                                            const PlausibilitySettings& settings);
 

@@ -3,6 +3,7 @@
 
 #include <Eigen/Geometry>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -20,6 +21,13 @@ struct StageTime {
   double milliseconds = 0.0;
 };
 
+/// How well the refinement explains the seen cloud. Dimensionless; of 1000 points each.
+struct RefinementQuality {
+  double fit = 0.0;       ///< mean log likelihood of seen and of visible points, up to constants
+  double surprise = 0.0;  ///< of the displacement under its prior: its length over the length that
+                          ///< is expected of what the cloud could show of it, in deviations
+};
+
 /// What a registration found, and how far it can be believed.
 struct Registration {
   Status status = Status::kFailed;
@@ -29,6 +37,7 @@ struct Registration {
   std::shared_ptr<const Deformation> deformation;  ///< null unless succeeded or refused
   SurfaceResidual residual;                        ///< moved surface against the cloud
   DisplacementStatistics displacement;             ///< non-rigid part over the organ
+  std::optional<RefinementQuality> refinement;     ///< where the refinement ran
   std::vector<PlausibilityCheck> checks;
   std::vector<StageTime> stages;
 

@@ -53,6 +53,8 @@ struct PlausibilitySettings {
   double max_extent_ratio = 3.0;       ///< same, from above
   double inlier_tolerance = 0.005;     ///< cloud points nearer than this are inliers [m]
   double max_residual = 0.06;          ///< median distance of cloud to moved surface, over extent
+  double max_residual_p95 = 0.12;      ///< same, 95th percentile
+  double max_surprise = 1.15;          ///< RefinementQuality::surprise; limit from training organs
   double max_displacement = 0.35;      ///< largest non-rigid displacement, over extent
   double max_jump_translation = 0.10;  ///< from the last accepted pose, at the organ's centroid [m]
   double max_jump_rotation = 60.0;     ///< from the last accepted pose [degree]
@@ -118,6 +120,10 @@ void visitSettings(Settings& settings, Visitor&& visitor) {
           "cloud points nearer to the moved surface than this are inliers [m]");
   visitor("plausibility/max_residual", p.max_residual, 0.0, 1.0,
           "median distance of the cloud to the moved surface over the organ's extent, at most");
+  visitor("plausibility/max_residual_p95", p.max_residual_p95, 0.0, 1.0,
+          "95th percentile of the same, at most");
+  visitor("plausibility/max_surprise", p.max_surprise, 0.0, 10.0,
+          "length of the refined displacement over the length expected, at most");
   visitor("plausibility/max_displacement", p.max_displacement, 0.0, 2.0,
           "largest non-rigid displacement over the organ's extent, at most");
   visitor("plausibility/max_jump_translation", p.max_jump_translation, 0.0, 10.0,

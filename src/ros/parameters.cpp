@@ -188,6 +188,8 @@ PlausibilitySettings fromConfig(const UniritConfig& config) {
   settings.max_extent_ratio = config.max_extent_ratio;
   settings.inlier_tolerance = config.inlier_tolerance;
   settings.max_residual = config.max_residual;
+  settings.max_residual_p95 = config.max_residual_p95;
+  settings.max_surprise = config.max_surprise;
   settings.max_displacement = config.max_displacement;
   settings.max_jump_translation = config.max_jump_translation;
   settings.max_jump_rotation = config.max_jump_rotation;

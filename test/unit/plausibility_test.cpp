@@ -43,7 +43,7 @@ Registration plausible() {
 
 std::string refusalOf(Registration registration) {
   applyChecks(checkOutput(registration, 0.2, kDefaults), registration);
-  EXPECT_EQ(registration.checks.size(), 4U);
+  EXPECT_EQ(registration.checks.size(), registration.refinement ? 6U : 5U);
   return registration.succeeded() ? "" : registration.message;
 }
 
@@ -117,6 +117,17 @@ TEST(CheckOutput, RefusesLargeResidualsAndDisplacementsNamingValueAndLimit) {
   registration.residual.median = 0.02;
   EXPECT_EQ(refusalOf(registration),
             "refused: median surface residual over extent is 0.1, the limit is 0.06");
+  registration = plausible();
+  registration.residual.p95 = 0.03;
+  EXPECT_EQ(refusalOf(registration),
+            "refused: 95th percentile of the surface residual over extent is 0.15, the limit is "
+            "0.12");
+  registration = plausible();
+  registration.refinement = RefinementQuality{-5.0, 1.0};
+  EXPECT_EQ(refusalOf(registration), "");
+  registration.refinement->surprise = 1.5;
+  EXPECT_EQ(refusalOf(registration),
+            "refused: surprise of the displacement is 1.5, the limit is 1.15");
   registration = plausible();
   registration.displacement.max = 0.1;
   EXPECT_EQ(refusalOf(registration),

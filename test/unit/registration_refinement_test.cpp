@@ -26,7 +26,8 @@ Registration registered(const PointCloud& preoperative, const PointCloud& intrao
   RegistrationSettings settings;
   settings.stages = stages;
   settings.refinement.correspondence = correspondence;
-  settings.plausibility.max_residual = 1.0;
+  settings.plausibility.max_residual = settings.plausibility.max_residual_p95 = 1.0;
+  settings.plausibility.max_surprise = 10.0;
   settings.plausibility.max_displacement = 2.0;
   Registrar registrar(weights, settings);
   return registrar.registerClouds(preoperative, intraoperative, Eigen::Isometry3d::Identity());
@@ -149,6 +150,29 @@ TEST(RefinedDeformation, MovesTheInsideSmoothlyAndNearerToTheTruth) {
     const Points rigid_steps = rigid.rightCols(400) - rigid.leftCols(400);
     EXPECT_LT((steps - rigid_steps).colwise().norm().maxCoeff(), 0.8F * 0.001F) << name;
   }
+}
+
+TEST(RegistrationStages, RefuseOtherOrgansAndAcceptTheirOwn) {
+  RegistrationSettings settings;
+  settings.stages = {Stage::kRefine};
+  Registrar registrar(std::make_shared<const Weights>(randomWeights(Pairing::kNearest, 1)),
+                      settings);
+  int others = 0, others_refused = 0;
+  for (const std::string& name : phantomOrgans()) {
+    const RegistrationPair own = pairOf(name, Protocol::kResampled);
+    for (const std::string& other : phantomOrgans()) {
+      const RegistrationPair pair = pairOf(other, Protocol::kResampled);
+      const Registration registration =
+          registrar.registerClouds(organ(own), seen(pair), alignCentroids(organ(own), seen(pair)));
+      if (name == other) {
+        EXPECT_TRUE(registration.succeeded()) << name << ": " << registration.message;
+        continue;
+      }
+      ++others;
+      others_refused += registration.succeeded() ? 0 : 1;
+    }
+  }
+  EXPECT_GE(others_refused, others * 9 / 10);
 }
 
 TEST(RefinedDeformation, KnowsItsConfidenceAnywhereUnlikeTheNetworks) {

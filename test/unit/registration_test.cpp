@@ -21,7 +21,8 @@ std::shared_ptr<const Weights> weights() {
 /// Limits that random weights do not reach.
 RegistrationSettings lenient() {
   RegistrationSettings settings;
-  settings.plausibility.max_residual = 1.0;
+  settings.plausibility.max_residual = settings.plausibility.max_residual_p95 = 1.0;
+  settings.plausibility.max_surprise = 10.0;
   settings.plausibility.max_displacement = 2.0;
   return settings;
 }

@@ -52,7 +52,8 @@ class RegisterTool : public ::testing::Test {
           "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty "
           "float z\nend_header\n0 0 0\n1 0 0\nnan 0 0\n");
     write("settings.yaml",
-          "sampling: {points: 256}\nplausibility: {max_residual: 1, max_displacement: 2}\n");
+          "sampling: {points: 256}\nplausibility: {max_residual: 1, max_residual_p95: 1, "
+          "max_surprise: 10, max_displacement: 2}\n");
     write("strict.yaml", "plausibility: {max_residual: 0}\n");
     write("wrong.yaml", "sampling: {point: 256}\n");
     write("broken.safetensors", "not weights");
