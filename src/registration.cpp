@@ -94,7 +94,9 @@ struct Registrar::Implementation {
 
   void prepare(const PointCloud& preoperative) {
     if (model && model->cloud.points.cols() == preoperative.points.cols() &&
-        model->cloud.points == preoperative.points) {
+        model->cloud.points == preoperative.points &&
+        model->cloud.normals.cols() == preoperative.normals.cols() &&
+        model->cloud.normals == preoperative.normals) {
       return;
     }
     auto fresh = std::make_unique<Model>();
@@ -170,7 +172,9 @@ Registration Registrar::Implementation::run(const PointCloud& preoperative,
   if (refines) {
     timed("refine", stages, [&] { refined = refine(target, rigid, displacements); });
     rigid = refined->pose;
-    registration.refinement = RefinementQuality{refined->fit, surprise(*refined)};
+    if (settings.refinement.correspondence == Correspondence::kSurface) {
+      registration.refinement = RefinementQuality{refined->fit, surprise(*refined)};
+    }
   }
 
   timed("assessment", stages, [&] {

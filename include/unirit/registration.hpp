@@ -37,7 +37,8 @@ struct Registration {
   std::shared_ptr<const Deformation> deformation;  ///< null unless succeeded or refused
   SurfaceResidual residual;                        ///< moved surface against the cloud
   DisplacementStatistics displacement;             ///< non-rigid part over the organ
-  std::optional<RefinementQuality> refinement;     ///< where the refinement ran
+  /// Where the refinement ran on surfaces; matched points leave less doubt.
+  std::optional<RefinementQuality> refinement;
   std::vector<PlausibilityCheck> checks;
   std::vector<StageTime> stages;
 

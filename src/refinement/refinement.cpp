@@ -35,6 +35,13 @@ float annealed(float first, float last, int step, int steps) {
   return first * std::pow(last / first, static_cast<float>(step) / static_cast<float>(steps));
 }
 
+/// Whether the outward normals look to the viewpoint on the whole; from a wrong one, such as that
+/// of another frame, they mostly look away.
+bool faces(const PointCloud& seen, const Eigen::Vector3f& viewpoint) {
+  const Points rays = ((-seen.points).colwise() + viewpoint).colwise().normalized();
+  return seen.normals.cwiseProduct(rays).sum() > 0.0F;
+}
+
 }  // namespace
 
 Refinement::Refinement(const PointCloud& source, const RefinementSettings& settings,
@@ -65,13 +72,14 @@ Refined Refinement::refine(const PointCloud& target, const Points& displacements
   // A whole surface is seen from all sides, a part from the viewpoint or where its normals point
   PointCloud seen{target.points, estimateNormals(target.points)};
   orientOutwards(seen.points, seen.normals);
+  const bool known = target.viewpoint && faces(seen, *target.viewpoint);
   const bool whole =
-      openness(seen.normals) < (target.viewpoint ? kWholeOpennessFromViewpoint : kWholeOpenness);
+      openness(seen.normals) < (known ? kWholeOpennessFromViewpoint : kWholeOpenness);
   std::optional<Eigen::Vector3f> eye;
   if (!whole) {
-    eye = target.viewpoint ? *target.viewpoint
-                           : Eigen::Vector3f(centroid(seen.points) +
-                                             kFar * seen.normals.rowwise().mean().normalized());
+    eye = known ? *target.viewpoint
+                : Eigen::Vector3f(centroid(seen.points) +
+                                  kFar * seen.normals.rowwise().mean().normalized());
     orientTowards(seen.points, *eye, seen.normals);
   }
 
