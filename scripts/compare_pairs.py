@@ -15,6 +15,8 @@ import sys
 
 import numpy as np
 
+from point_files import read_ply
+
 STATISTICS = ("before", "target to truth", "truth to target")
 LARGEST_Z = 4.0
 ROUNDING = 1e-3  # of coordinates in single precision [mm]
@@ -35,17 +37,6 @@ class PairSet:
         first, last = entry["data_offsets"]
         kind = {"F32": "<f4", "F64": "<f8"}[entry["dtype"]]
         return self.data[self.start + first : self.start + last].view(kind).reshape(entry["shape"])
-
-
-def read_points(path):
-    """Coordinates of a binary little-endian PLY whose vertices are floats, x y z first."""
-    data = path.read_bytes()
-    end = data.index(b"end_header\n") + len(b"end_header\n")
-    header = data[:end].decode()
-    count = int(header.split("element vertex ")[1].split()[0])
-    floats = header.count("property float")
-    values = np.frombuffer(data, "<f4", count * floats, end)
-    return values.reshape(count, floats)[:, :3].astype(float)
 
 
 def statistics(source, target, truth):
@@ -71,7 +62,7 @@ def of_pair_set(pairs, protocol):
 
 def of_folder(folder):
     names = ("source.ply", "target.ply", "truth.ply")
-    return np.array(statistics(*(read_points(folder / name) for name in names)))
+    return np.array(statistics(*(read_ply(folder / name).astype(float) for name in names)))
 
 
 def compare(found, folders, organs):
