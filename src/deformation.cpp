@@ -79,7 +79,7 @@ Points Deformation::move(const Points& preoperative) const {
 }
 
 Points Deformation::moveRigidly(const Points& preoperative) const {
-  return (T_intraoperative_preoperative_ * preoperative.cast<double>()).cast<float>();
+  return moved(T_intraoperative_preoperative_, preoperative);
 }
 
 Eigen::RowVectorXf Deformation::confidence(const Points& preoperative) const {

@@ -10,6 +10,10 @@ Eigen::Vector3f centroid(const Points& points) {
   return points.cast<double>().rowwise().mean().cast<float>();
 }
 
+Points moved(const Eigen::Isometry3d& pose, const Points& points) {
+  return (pose * points.cast<double>()).cast<float>();
+}
+
 double extent(const Points& points) {
   const Eigen::Vector3f centre = centroid(points);
   return 2.0 * (points.colwise() - centre).cwiseAbs().maxCoeff();

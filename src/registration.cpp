@@ -197,7 +197,7 @@ Registration Registrar::Implementation::run(const PointCloud& preoperative,
 PointCloud Registrar::Implementation::sample(const PointCloud& cloud,
                                              const Eigen::Isometry3d& T_organ_cloud) const {
   const auto toNetwork = [&](const Points& points) {
-    return model->normalisation.apply((T_organ_cloud * points.cast<double>()).cast<float>());
+    return model->normalisation.apply(moved(T_organ_cloud, points));
   };
   PointCloud sampled{
       toNetwork(select(cloud.points, sampleEvenly(cloud.points, settings.sampling.points))), {}};

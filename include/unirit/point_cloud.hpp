@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <optional>
 
 namespace unirit {
@@ -26,6 +27,9 @@ struct Surface {
 
 /// Mean of the points; sums in double precision. Throws std::invalid_argument on an empty cloud.
 Eigen::Vector3f centroid(const Points& points);
+
+/// The points, moved rigidly; computed in double precision.
+Points moved(const Eigen::Isometry3d& pose, const Points& points);
 
 /// Twice the largest absolute coordinate about the centroid [m]: the length every limit scales
 /// with.

@@ -16,10 +16,7 @@ RegistrationSettings forWeights(const Weights& weights, RegistrationSettings set
 }  // namespace
 
 MethodResult movedRigidly(const RegistrationPair& pair, const Eigen::Isometry3d& pose) {
-  const auto moved = [&](const Points& points) -> Points {
-    return (pose * points.cast<double>()).cast<float>();
-  };
-  return {false, moved(pair.source), moved(pair.interior), pose};
+  return {false, moved(pose, pair.source), moved(pose, pair.interior), pose};
 }
 
 MethodResult Identity::registerPair(const RegistrationPair& pair) {

@@ -11,10 +11,6 @@ namespace {
 
 constexpr double kDegrees = 180.0 / M_PI;
 
-Points moved(const Eigen::Isometry3d& pose, const Points& points) {
-  return (pose * points.cast<double>()).cast<float>();
-}
-
 double meanSquare(const Eigen::RowVectorXf& distances) {
   return distances.cast<double>().squaredNorm() / static_cast<double>(distances.size());
 }

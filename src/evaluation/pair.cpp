@@ -73,10 +73,6 @@ Points interiorOf(const Points& surface, Random& random) {
   return interior;
 }
 
-Points moved(const Eigen::Isometry3d& pose, const Points& points) {
-  return (pose * points.cast<double>()).cast<float>();
-}
-
 }  // namespace
 
 DeformedOrgan::DeformedOrgan(const Surface& organ, std::uint64_t seed, Eigen::Index pool) {

@@ -28,11 +28,10 @@ struct RowsView {
   long count;
 };
 
-/// Oriented points, one coordinate an array; the count is a multiple of kPointBlock.
+/// Oriented points, one coordinate an array, in whole blocks of kPointBlock.
 struct OrientedPointsView {
   const float* position[3];
   const float* normal[3];
-  long count;
 };
 
 /// Points that a kernel takes together, for every instruction set the same.

@@ -107,7 +107,7 @@ void CoherentSolver::assemble() {
   }
   for (int axis = 0; axis < 3; ++axis) {
     matrix_.block(3 * r, axis * r, kPose, r) = products_.block(6 * r + axis * kPose, 0, kPose, r);
-    unknowns_.segment(axis * r, r) = products_.row(6 * r + 18 + axis).head(r).transpose();
+    unknowns_.segment(axis * r, r) = products_.row(6 * r + 3 * kPose + axis).head(r).transpose();
   }
   matrix_.diagonal().head(3 * r).array() += 1.0F;  // the prior's coefficients are standard normal
   matrix_.bottomRightCorner<kPose, kPose>() = pose_matrix_;

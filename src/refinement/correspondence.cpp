@@ -83,8 +83,7 @@ float* CorrespondenceEstimator::row(int index) { return targets_.data() + index 
 OrientedPointsView CorrespondenceEstimator::view() const {
   const float* first = targets_.data();
   return {{first, first + padded_, first + 2 * padded_},
-          {first + 3 * padded_, first + 4 * padded_, first + 5 * padded_},
-          padded_};
+          {first + 3 * padded_, first + 4 * padded_, first + 5 * padded_}};
 }
 
 void CorrespondenceEstimator::findNearby(const Eigen::Vector3f& point, float reach,

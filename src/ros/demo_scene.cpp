@@ -20,10 +20,6 @@ Eigen::Isometry3d placeOrgan(const Points& organ) {
          Eigen::Translation3d(-centroid(organ).cast<double>());
 }
 
-Points moved(const Eigen::Isometry3d& transform, const Points& points) {
-  return (transform * points.cast<double>()).cast<float>();
-}
-
 }  // namespace
 
 DemoScene::DemoScene(const Surface& organ, const SceneSettings& settings)

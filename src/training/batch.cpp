@@ -79,8 +79,7 @@ Batch stack(const std::vector<RegistrationPair>& pairs) {
     source.push_back(toTensor(unit.apply(pair.source)));
     target.push_back(toTensor(unit.apply(pair.target)));
     truth.push_back(toTensor(unit.apply(pair.truth)));
-    rigid.push_back(
-        toTensor(unit.apply((pair.best_rigid * pair.source.cast<double>()).cast<float>())));
+    rigid.push_back(toTensor(unit.apply(moved(pair.best_rigid, pair.source))));
     scale.push_back(unit.scale);
   }
   return {torch::stack(source), torch::stack(target), torch::stack(truth), torch::stack(rigid),

@@ -32,8 +32,7 @@ struct Targets {
   double normal(int axis, long j) { return static_cast<double>(at(3 + axis, j)); }
   OrientedPointsView view() const {
     return {{numbers[0].data(), numbers[1].data(), numbers[2].data()},
-            {numbers[3].data(), numbers[4].data(), numbers[5].data()},
-            static_cast<long>(numbers[0].size())};
+            {numbers[3].data(), numbers[4].data(), numbers[5].data()}};
   }
   std::vector<std::vector<float>> numbers;
 };
