@@ -2,10 +2,13 @@
 #include "unirit/normals.hpp"
 
 #include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <queue>
 #include <stdexcept>
 #include <tuple>
+#include <utility>
 #include <vector>
 
 #include "neighbours.hpp"
@@ -13,72 +16,152 @@
 namespace unirit {
 namespace {
 
-constexpr std::size_t kNormalNeighbours = 14;  // the point itself among them
+constexpr Eigen::Index kNormalNeighbours = 14;  // the point itself among them
 
-/// For every point the points whose neighbour it is, and its own neighbours.
-std::vector<std::vector<Eigen::Index>> neighbourGraph(const Points& points) {
+/// Column i: the points nearest to point i, itself among them.
+Eigen::MatrixXi nearestPoints(const Points& points) {
   const Neighbours neighbours(points);
-  std::vector<std::vector<Eigen::Index>> graph(static_cast<std::size_t>(points.cols()));
+  Eigen::MatrixXi nearest(std::min<Eigen::Index>(kNormalNeighbours, points.cols()), points.cols());
   for (Eigen::Index i = 0; i < points.cols(); ++i) {
-    const auto nearest = neighbours.find<kNormalNeighbours>(points.col(i));
-    for (std::size_t k = 0; k < nearest.count; ++k) {
-      const auto j = static_cast<Eigen::Index>(nearest.indices[k]);
-      if (j == i) continue;
-      graph[static_cast<std::size_t>(i)].push_back(j);
-      graph[static_cast<std::size_t>(j)].push_back(i);
-    }
+    const auto found = neighbours.find<kNormalNeighbours>(points.col(i));
+    std::transform(found.indices.begin(), found.indices.begin() + nearest.rows(),
+                   nearest.col(i).data(), [](std::size_t j) { return static_cast<int>(j); });
   }
-  return graph;
+  return nearest;
 }
 
-/// Carries the sign of the root's normal to all points that can be reached from it; which these
-/// are.
-std::vector<Eigen::Index> propagate(Eigen::Index root,
-                                    const std::vector<std::vector<Eigen::Index>>& graph,
-                                    Points& normals, std::vector<bool>& oriented) {
-  std::vector<Eigen::Index> piece;
-  using Edge = std::tuple<float, Eigen::Index, Eigen::Index>;  // agreement, from, to
-  std::priority_queue<Edge> edges;
-  const auto reach = [&](Eigen::Index i) {
-    oriented[static_cast<std::size_t>(i)] = true;
-    piece.push_back(i);
-    for (const Eigen::Index j : graph[static_cast<std::size_t>(i)]) {
-      if (!oriented[static_cast<std::size_t>(j)])
-        edges.emplace(std::abs(normals.col(i).dot(normals.col(j))), i, j);
+Points normalsAmong(const Eigen::MatrixXi& nearest, const Points& points) {
+  Points normals(3, points.cols());
+  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3f> solver;
+  for (Eigen::Index i = 0; i < points.cols(); ++i) {
+    Eigen::Vector3f sum = Eigen::Vector3f::Zero();
+    Eigen::Matrix3f scatter = Eigen::Matrix3f::Zero();
+    for (const int j : nearest.col(i)) {
+      const Eigen::Vector3f offset = points.col(j) - points.col(i);
+      sum += offset;
+      scatter += offset * offset.transpose();
     }
-  };
-  reach(root);
-  while (!edges.empty()) {
-    const auto [agreement, from, to] = edges.top();
-    edges.pop();
-    if (oriented[static_cast<std::size_t>(to)]) continue;
-    if (normals.col(from).dot(normals.col(to)) < 0.0F) normals.col(to) *= -1.0F;
-    reach(to);
+    scatter -= sum * sum.transpose() / static_cast<float>(nearest.rows());
+    solver.computeDirect(scatter);
+    normals.col(i) = solver.eigenvectors().col(0);
   }
-  return piece;
+  return normals;
+}
+
+/// Points joined to their nearest ones and to those whose nearest they are.
+class NeighbourGraph {
+ public:
+  explicit NeighbourGraph(const Eigen::MatrixXi& nearest)
+      : begins_(at(nearest.cols()) + 1, nearest.rows()), joined_(at(2 * nearest.size())) {
+    begins_.back() = 0;
+    for (const int j : nearest.reshaped()) ++begins_[at(j)];
+    // Ends at first; filling from the back turns them into beginnings
+    std::partial_sum(begins_.begin(), begins_.end(), begins_.begin());
+    for (Eigen::Index i = 0; i < nearest.cols(); ++i) {
+      for (const int j : nearest.col(i)) {
+        joined_[at(--begins_[at(i)])] = j;
+        joined_[at(--begins_[at(j)])] = static_cast<int>(i);
+      }
+    }
+  }
+
+  /// Calls visit(j) for all points joined to i, for some of them twice.
+  template <class Visit>
+  void forEach(Eigen::Index i, const Visit& visit) const {
+    for (Eigen::Index k = begins_[at(i)]; k < begins_[at(i) + 1]; ++k) visit(joined_[at(k)]);
+  }
+
+ private:
+  static std::size_t at(Eigen::Index i) { return static_cast<std::size_t>(i); }
+
+  std::vector<Eigen::Index> begins_;
+  std::vector<int> joined_;
+};
+
+/// Carries the sign of a root's normal to all points that can be reached from it, along the edges
+/// that agree best (Prim 1957).
+class Orientation {
+ public:
+  Orientation(const NeighbourGraph& graph, Points& normals)
+      : graph_(graph), normals_(normals), best_(static_cast<std::size_t>(normals.cols())) {}
+
+  bool oriented(Eigen::Index i) const { return best_[static_cast<std::size_t>(i)].done; }
+
+  /// The points oriented now, the root among them.
+  const std::vector<int>& propagate(int root) {
+    piece_.clear();
+    reach(root);
+    while (!edges_.empty()) {
+      const auto [agreement, from, to] = edges_.top();
+      edges_.pop();
+      if (oriented(to)) continue;
+      if (normals_.col(from).dot(normals_.col(to)) < 0.0F) normals_.col(to) *= -1.0F;
+      reach(to);
+    }
+    return piece_;
+  }
+
+ private:
+  using Edge = std::tuple<float, int, int>;  // agreement, from, to
+  struct Best {
+    std::pair<float, int> edge{-1.0F, 0};  // agreement, from
+    bool done = false;
+  };
+
+  void reach(int i) {
+    best_[static_cast<std::size_t>(i)].done = true;
+    piece_.push_back(i);
+    graph_.forEach(i, [&](int j) {
+      Best& best = best_[static_cast<std::size_t>(j)];
+      if (best.done) return;
+      const std::pair edge(std::abs(normals_.col(i).dot(normals_.col(j))), i);
+      if (edge <= best.edge) return;
+      best.edge = edge;
+      edges_.emplace(edge.first, i, j);
+    });
+  }
+
+  const NeighbourGraph& graph_;
+  Points& normals_;
+  std::vector<Best> best_;  // way to each point that has been found so far
+  std::vector<int> piece_;
+  std::priority_queue<Edge> edges_;
+};
+
+void orientAmong(const Eigen::MatrixXi& nearest, const Points& points, Points& normals) {
+  const NeighbourGraph graph(nearest);
+  const Eigen::Vector3f centre = centroid(points);
+  Orientation orientation(graph, normals);
+  for (int root = 0; root < points.cols(); ++root) {
+    if (orientation.oriented(root)) continue;
+    const std::vector<int>& piece = orientation.propagate(root);
+    double outwards = 0.0;
+    for (const int i : piece) outwards += normals.col(i).dot(points.col(i) - centre);
+    if (outwards >= 0.0) continue;
+    for (const int i : piece) normals.col(i) *= -1.0F;
+  }
+}
+
+void requireSurface(const Points& points) {
+  if (points.cols() < 3) throw std::invalid_argument("points: three at least make a surface");
 }
 
 }  // namespace
 
 Points estimateNormals(const Points& points) {
-  if (points.cols() < 3) throw std::invalid_argument("points: three at least make a surface");
-  const Neighbours neighbours(points);
-  Points normals(3, points.cols());
-  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3f> solver;
-  for (Eigen::Index i = 0; i < points.cols(); ++i) {
-    const auto nearest = neighbours.find<kNormalNeighbours>(points.col(i));
-    Eigen::Vector3f sum = Eigen::Vector3f::Zero();
-    Eigen::Matrix3f scatter = Eigen::Matrix3f::Zero();
-    for (std::size_t k = 0; k < nearest.count; ++k) {
-      const Eigen::Vector3f offset =
-          points.col(static_cast<Eigen::Index>(nearest.indices[k])) - points.col(i);
-      sum += offset;
-      scatter += offset * offset.transpose();
-    }
-    scatter -= sum * sum.transpose() / static_cast<float>(nearest.count);
-    solver.computeDirect(scatter);
-    normals.col(i) = solver.eigenvectors().col(0);
-  }
+  requireSurface(points);
+  return normalsAmong(nearestPoints(points), points);
+}
+
+void orientOutwards(const Points& points, Points& normals) {
+  orientAmong(nearestPoints(points), points, normals);
+}
+
+Points outwardNormals(const Points& points) {
+  requireSurface(points);
+  const Eigen::MatrixXi nearest = nearestPoints(points);
+  Points normals = normalsAmong(nearest, points);
+  orientAmong(nearest, points, normals);
   return normals;
 }
 
@@ -104,20 +187,6 @@ Points vertexNormals(const Surface& mesh) {
   }
   for (auto normal : normals.colwise()) normal.stableNormalize();
   return normals;
-}
-
-void orientOutwards(const Points& points, Points& normals) {
-  const auto graph = neighbourGraph(points);
-  const Points offsets = points.colwise() - centroid(points);
-  std::vector<bool> oriented(static_cast<std::size_t>(points.cols()), false);
-  for (Eigen::Index root = 0; root < points.cols(); ++root) {
-    if (oriented[static_cast<std::size_t>(root)]) continue;
-    const std::vector<Eigen::Index> piece = propagate(root, graph, normals, oriented);
-    double outwards = 0.0;
-    for (const Eigen::Index i : piece) outwards += normals.col(i).dot(offsets.col(i));
-    if (outwards >= 0.0) continue;
-    for (const Eigen::Index i : piece) normals.col(i) *= -1.0F;
-  }
 }
 
 void orientTowards(const Points& points, const Eigen::Vector3f& viewpoint, Points& normals) {

@@ -33,12 +33,9 @@ PointCloud dropInvalid(const PointCloud& cloud) {
 }
 
 /// The cloud's own normals, or estimated ones turned outwards.
-Points outwardNormals(const PointCloud& cloud, const std::vector<Eigen::Index>& samples) {
+Points normalsOf(const PointCloud& cloud, const std::vector<Eigen::Index>& samples) {
   if (cloud.normals.cols() > 0) return select(cloud.normals, samples);
-  const Points points = select(cloud.points, samples);
-  Points normals = estimateNormals(points);
-  orientOutwards(points, normals);
-  return normals;
+  return outwardNormals(select(cloud.points, samples));
 }
 
 /// Runs a stage and notes how long it took.
@@ -78,7 +75,8 @@ struct Registrar::Implementation {
   /// The organ, sampled and normalised: what does not change from one view to the next.
   struct Model {
     PointCloud cloud;    // as given
-    PointCloud sampled;  // N points with normals, the network's unit
+    Points samples;      // N points of it
+    PointCloud sampled;  // the same with normals, the network's unit
     Points vertices;     // every point, the network's unit
     Normalisation normalisation;
     double extent = 0.0;  // [m]
@@ -103,9 +101,10 @@ struct Registrar::Implementation {
     fresh->cloud = preoperative;
     fresh->extent = unirit::extent(preoperative.points);
     const auto samples = sampleEvenly(preoperative.points, settings.sampling.points);
-    const Points sampled = select(preoperative.points, samples);
-    fresh->normalisation = Normalisation::of(sampled);
-    fresh->sampled = {fresh->normalisation.apply(sampled), outwardNormals(preoperative, samples)};
+    fresh->samples = select(preoperative.points, samples);
+    fresh->normalisation = Normalisation::of(fresh->samples);
+    fresh->sampled = {fresh->normalisation.apply(fresh->samples),
+                      normalsOf(preoperative, samples)};
     fresh->vertices = fresh->normalisation.apply(preoperative.points);
     if (contains(settings.stages, Stage::kRefine)) {
       fresh->refinement =
@@ -186,8 +185,8 @@ Registration Registrar::Implementation::run(const PointCloud& preoperative,
         surfaceResidual(registration.deformation->movedSurface(), intraoperative.points,
                         settings.plausibility.inlier_tolerance);
     registration.displacement =
-        displacementStatistics(registration.deformation->moveRigidly(preoperative.points),
-                               registration.deformation->displacements());
+        displacementStatistics(registration.deformation->displacements(),
+                               registration.deformation->jacobians(model->samples));
   });
   applyChecks(checkOutput(registration, model->extent, settings.plausibility), registration);
   return registration;

@@ -23,6 +23,9 @@ Points vertexNormals(const Surface& mesh);
 /// several.
 void orientOutwards(const Points& points, Points& normals);
 
+/// estimateNormals, then orientOutwards; the nearest points are sought only once.
+Points outwardNormals(const Points& points);
+
 /// Turns every normal to the half space of the viewpoint (same frame and unit as the points).
 void orientTowards(const Points& points, const Eigen::Vector3f& viewpoint, Points& normals);
 

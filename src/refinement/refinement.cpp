@@ -71,8 +71,7 @@ Eigen::RowVectorXf Refinement::visibility(const PointCloud& moved,
 
 Refined Refinement::refine(const PointCloud& target, const Points& displacements) {
   // A whole surface is seen from all sides, a part from the viewpoint or where its normals point
-  PointCloud seen{target.points, estimateNormals(target.points)};
-  orientOutwards(seen.points, seen.normals);
+  PointCloud seen{target.points, outwardNormals(target.points)};
   const bool known = target.viewpoint && faces(seen, *target.viewpoint);
   const bool whole =
       openness(seen.normals) < (known ? kWholeOpennessFromViewpoint : kWholeOpenness);

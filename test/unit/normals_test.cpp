@@ -144,6 +144,14 @@ TEST(OrientOutwards, DependsOnNeitherSignsNorOrder) {
   EXPECT_LT((other_normals - back).cwiseAbs().maxCoeff(), 1e-4F);
 }
 
+TEST(OutwardNormals, AreThoseEstimatedAndTurnedOutwards) {
+  const PointCloud organ = phantom(1024);
+  Points normals = estimateNormals(organ.points);
+  orientOutwards(organ.points, normals);
+  EXPECT_EQ(outwardNormals(organ.points), normals);
+  EXPECT_THROW(outwardNormals(Points::Zero(3, 2)), std::invalid_argument);
+}
+
 TEST(OrientTowards, TurnsToTheViewpointWhatLooksAwayAndNothingElse) {
   const PointCloud ball = sphere(800, 0.1);
   const Eigen::Vector3f viewpoint(0.3F, -0.2F, 0.1F);

@@ -10,8 +10,7 @@ namespace unirit::test {
 /// normals.
 inline PointCloud orientedOrgan(Eigen::Index count, std::uint64_t seed) {
   PointCloud organ{10.0F * bumpyEllipsoid(count, seed), {}};
-  organ.normals = estimateNormals(organ.points);
-  orientOutwards(organ.points, organ.normals);
+  organ.normals = outwardNormals(organ.points);
   return organ;
 }
 
