@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "unirit/deformation.hpp"
 
+#include <Eigen/LU>
 #include <cmath>
 #include <stdexcept>
 #include <utility>
@@ -11,6 +12,8 @@ namespace unirit {
 namespace {
 
 constexpr std::size_t kInterpolationNeighbours = 8;
+constexpr float kRidge = 1e-3F;                 // over the scatter of the neighbours
+constexpr std::size_t kGradientNeighbours = 9;  // of a surface point: itself and 8 more
 
 /// Displacements known at the surface's points; in between the inverse-distance mean of the
 /// nearest (Shepard 1968).
@@ -24,6 +27,15 @@ class InterpolatedField : public DisplacementField {
   Points displacements(const Points& preoperative) const override {
     Points result(3, preoperative.cols());
     for (Eigen::Index i = 0; i < preoperative.cols(); ++i) result.col(i) = at(preoperative.col(i));
+    return result;
+  }
+
+  std::vector<Eigen::Matrix3f> gradients(const Points& preoperative) const override {
+    std::vector<Eigen::Matrix3f> result;
+    result.reserve(static_cast<std::size_t>(preoperative.cols()));
+    for (Eigen::Index i = 0; i < preoperative.cols(); ++i) {
+      result.push_back(gradientAt(preoperative.col(i)));
+    }
     return result;
   }
 
@@ -43,6 +55,24 @@ class InterpolatedField : public DisplacementField {
       weights += weight;
     }
     return sum / weights;
+  }
+
+  /// The linear map that best takes the offsets of the neighbours to their changes. The ridge
+  /// stands for "no change", which is what they cannot tell about the direction across a flat
+  /// patch.
+  Eigen::Matrix3f gradientAt(const Eigen::Vector3f& point) const {
+    const auto nearest = neighbours_.find<kGradientNeighbours>(point);
+    const Eigen::Vector3f displacement = at(point);
+    Eigen::Matrix3f scatter = Eigen::Matrix3f::Zero(), products = Eigen::Matrix3f::Zero();
+    for (std::size_t k = 0; k < nearest.count; ++k) {
+      const auto j = static_cast<Eigen::Index>(nearest.indices[k]);
+      const Eigen::Vector3f offset = surface_.col(j) - point;
+      scatter += offset * offset.transpose();
+      products += (displacements_.col(j) - displacement) * offset.transpose();
+    }
+    if (scatter.trace() == 0.0F) return Eigen::Matrix3f::Zero();
+    scatter.diagonal().array() += kRidge * scatter.trace();
+    return products * scatter.inverse();
   }
 
   Points surface_;
@@ -80,6 +110,13 @@ Points Deformation::move(const Points& preoperative) const {
 
 Points Deformation::moveRigidly(const Points& preoperative) const {
   return moved(T_intraoperative_preoperative_, preoperative);
+}
+
+std::vector<Eigen::Matrix3f> Deformation::jacobians(const Points& preoperative) const {
+  std::vector<Eigen::Matrix3f> jacobians = field_->gradients(preoperative);
+  const Eigen::Matrix3f rotation = T_intraoperative_preoperative_.linear().cast<float>();
+  for (Eigen::Matrix3f& jacobian : jacobians) jacobian += rotation;
+  return jacobians;
 }
 
 Eigen::RowVectorXf Deformation::confidence(const Points& preoperative) const {

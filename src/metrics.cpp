@@ -1,18 +1,18 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "unirit/metrics.hpp"
 
+#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
+#include <utility>
 #include <vector>
 
 #include "neighbours.hpp"
 
 namespace unirit {
 namespace {
-
-constexpr std::size_t kJacobianNeighbours = 9;  // the point itself and its 8 nearest
 
 template <class Row>
 std::vector<float> toVector(const Row& row) {
@@ -21,32 +21,6 @@ std::vector<float> toVector(const Row& row) {
 
 double rootMeanSquare(const Eigen::RowVectorXf& lengths) {
   return std::sqrt(lengths.cast<double>().squaredNorm() / static_cast<double>(lengths.size()));
-}
-
-/// Determinant of the linear map that best takes the offsets of the neighbours before to those
-/// after; the ridge stands for "no change", which is what the offsets cannot tell about the
-/// direction across a flat patch.
-float localDeterminant(const Eigen::Matrix3Xf& before, const Eigen::Matrix3Xf& change) {
-  const Eigen::Matrix3f scatter = before * before.transpose();
-  const Eigen::Matrix3f ridge = 1e-3F * scatter.trace() * Eigen::Matrix3f::Identity();
-  const Eigen::Matrix3f gradient = change * before.transpose() * (scatter + ridge).inverse();
-  return (Eigen::Matrix3f::Identity() + gradient).determinant();
-}
-
-double foldedFraction(const Points& rigid, const Points& displacements) {
-  const Neighbours neighbours(rigid);
-  Eigen::Index folded = 0;
-  for (Eigen::Index i = 0; i < rigid.cols(); ++i) {
-    const auto nearest = neighbours.find<kJacobianNeighbours>(rigid.col(i));
-    Eigen::Matrix3Xf before(3, nearest.count), change(3, nearest.count);
-    for (std::size_t k = 0; k < nearest.count; ++k) {
-      const auto j = static_cast<Eigen::Index>(nearest.indices[k]);
-      before.col(static_cast<Eigen::Index>(k)) = rigid.col(j) - rigid.col(i);
-      change.col(static_cast<Eigen::Index>(k)) = displacements.col(j) - displacements.col(i);
-    }
-    if (before.squaredNorm() > 0.0F && localDeterminant(before, change) <= 0.0F) ++folded;
-  }
-  return static_cast<double>(folded) / static_cast<double>(rigid.cols());
 }
 
 }  // namespace
@@ -90,16 +64,30 @@ SurfaceResidual surfaceResidual(const Points& moved_surface, const Points& cloud
   return residual;
 }
 
-DisplacementStatistics displacementStatistics(const Points& rigid, const Points& displacements) {
-  if (rigid.cols() != displacements.cols() || rigid.cols() == 0) {
-    throw std::invalid_argument("displacements: must be as many as the points, at least one");
+DisplacementStatistics displacementStatistics(const Points& displacements,
+                                              const std::vector<Eigen::Matrix3f>& jacobians) {
+  if (displacements.cols() == 0 || jacobians.empty()) {
+    throw std::invalid_argument("displacements, jacobians: must hold at least one point");
   }
   const Eigen::RowVectorXf lengths = displacements.colwise().norm();
   DisplacementStatistics statistics;
   statistics.rms = rootMeanSquare(lengths);
   statistics.p95 = quantile(toVector(lengths), 0.95);
   statistics.max = lengths.maxCoeff();
-  statistics.folded_fraction = foldedFraction(rigid, displacements);
+  std::vector<float> stretches, compressions;
+  std::size_t folded = 0;
+  for (const Eigen::Matrix3f& jacobian : jacobians) {
+    // Principal stretches are the roots of the eigenvalues of J^T J
+    Eigen::SelfAdjointEigenSolver<Eigen::Matrix3f> solver;
+    solver.computeDirect(jacobian.transpose() * jacobian, Eigen::EigenvaluesOnly);
+    const Eigen::Vector3f stretch = solver.eigenvalues().cwiseMax(0.0F).cwiseSqrt();
+    compressions.push_back(stretch[0]);
+    stretches.push_back(stretch[2]);
+    if (!(jacobian.determinant() > 0.0F)) ++folded;
+  }
+  statistics.stretch = quantile(std::move(stretches), 0.95);
+  statistics.compression = quantile(std::move(compressions), 0.05);
+  statistics.folded_fraction = static_cast<double>(folded) / static_cast<double>(jacobians.size());
   return statistics;
 }
 

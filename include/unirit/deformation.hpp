@@ -3,6 +3,7 @@
 
 #include <Eigen/Geometry>
 #include <memory>
+#include <vector>
 
 #include "unirit/point_cloud.hpp"
 
@@ -16,6 +17,9 @@ class DisplacementField {
   /// Of points of the pre-operative frame, 3 x Q: what is added after the rigid transform, in the
   /// intra-operative frame [m].
   virtual Points displacements(const Points& preoperative) const = 0;
+
+  /// Derivatives of these displacements by the point, one matrix a point.
+  virtual std::vector<Eigen::Matrix3f> gradients(const Points& preoperative) const = 0;
 
   /// How much has been learnt of each point's displacement, a row of Q in [0, 1]: one minus its
   /// variance over the variance before anything was seen. Empty where the field cannot tell.
@@ -44,6 +48,10 @@ class Deformation {
 
   /// Any points of the pre-operative frame, moved by the rigid part alone.
   Points moveRigidly(const Points& preoperative) const;
+
+  /// Derivatives of `move` by the point, one matrix a point: how the organ turns and is stretched
+  /// there. Where its determinant is not positive the organ is folded over.
+  std::vector<Eigen::Matrix3f> jacobians(const Points& preoperative) const;
 
   /// DisplacementField::confidence.
   Eigen::RowVectorXf confidence(const Points& preoperative) const;

@@ -17,12 +17,14 @@ struct SurfaceResidual {
   double coverage = 0.0;         ///< share of the organ's points with a cloud point nearby
 };
 
-/// The non-rigid displacement over the organ's points.
+/// The non-rigid displacement over the organ.
 struct DisplacementStatistics {
   double rms = 0.0;              ///< [m]
   double p95 = 0.0;              ///< [m]
   double max = 0.0;              ///< [m]
   double folded_fraction = 0.0;  ///< share of points where the Jacobian determinant is <= 0
+  double stretch = 1.0;          ///< largest principal stretch of a point, 95th percentile
+  double compression = 1.0;      ///< smallest principal stretch of a point, 5th percentile
 };
 
 /// The value below which `share` of the values lie: the one of nearest rank, share in [0, 1].
@@ -39,7 +41,9 @@ Eigen::RowVectorXf nearestDistances(const Points& from, const Points& to);
 SurfaceResidual surfaceResidual(const Points& moved_surface, const Points& cloud,
                                 double inlier_tolerance);
 
-/// `rigid`: the organ's points moved rigidly, 3 x N; `displacements`: what the non-rigid part adds.
-DisplacementStatistics displacementStatistics(const Points& rigid, const Points& displacements);
+/// `displacements`: of the organ's points, 3 x N; `jacobians`: Deformation::jacobians, of as many
+/// points as one likes. Throws std::invalid_argument where there is none of either.
+DisplacementStatistics displacementStatistics(const Points& displacements,
+                                              const std::vector<Eigen::Matrix3f>& jacobians);
 
 }  // namespace unirit

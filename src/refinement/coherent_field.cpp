@@ -30,6 +30,11 @@ Points CoherentField::displacements(const Points& preoperative) const {
   return prior_->displacements(normalisation_.apply(preoperative), coefficients_);
 }
 
+std::vector<Eigen::Matrix3f> CoherentField::gradients(const Points& preoperative) const {
+  return prior_->gradients(normalisation_.apply(preoperative),
+                           coefficients_ / normalisation_.scale);
+}
+
 Eigen::RowVectorXf CoherentField::confidence(const Points& preoperative) const {
   Eigen::RowVectorXf confidence(preoperative.cols());
   for (Eigen::Index begin = 0; begin < preoperative.cols(); begin += kBlock) {

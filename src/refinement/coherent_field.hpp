@@ -19,6 +19,7 @@ class CoherentField : public DisplacementField {
                 const Eigen::MatrixXf& covariance_factor);
 
   Points displacements(const Points& preoperative) const override;
+  std::vector<Eigen::Matrix3f> gradients(const Points& preoperative) const override;
   Eigen::RowVectorXf confidence(const Points& preoperative) const override;
 
  private:

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <vector>
 
 #include "unirit/point_cloud.hpp"
 
@@ -28,6 +29,10 @@ class DisplacementPrior {
 
   /// Displacements at the points, 3 x Q, for coefficients 3 x rank.
   Points displacements(const Points& points, const Eigen::Matrix3Xf& coefficients) const;
+
+  /// Derivatives of these displacements by the point, one matrix a point.
+  std::vector<Eigen::Matrix3f> gradients(const Points& points,
+                                         const Eigen::Matrix3Xf& coefficients) const;
 
  private:
   Eigen::MatrixXf covariances(const Points& points) const;  // inducing points x Q

@@ -46,6 +46,25 @@ TEST(Deformation, RigidPartLeavesDisplacementsOut) {
   EXPECT_TRUE(deformation.moveRigidly(surface).isApprox(somePose().cast<float>() * surface, 1e-6F));
 }
 
+TEST(Deformation, TellsHowTheSurfaceIsStretchedAndTurned) {
+  const Points surface = test::bumpyEllipsoid(800, 4);
+  Points displacements = Points::Zero(3, 800);
+  displacements.row(0) = 0.5F * surface.row(0);  // in the intra-operative frame
+  const auto pose = somePose();
+  const auto meanDeterminant = [&](float share) {
+    const Points squeezed = pose.linear().cast<float>() * (share * displacements);
+    double sum = 0.0;
+    for (const auto& jacobian : Deformation(pose, surface, squeezed).jacobians(surface)) {
+      sum += jacobian.determinant();
+    }
+    return sum / 800.0;
+  };
+  EXPECT_NEAR(meanDeterminant(0.0F), 1.0, 1e-5);
+  EXPECT_NEAR(meanDeterminant(1.0F), 1.5, 0.02);
+  EXPECT_NEAR(meanDeterminant(-1.0F), 0.5, 0.02);
+  EXPECT_LT(meanDeterminant(-4.0F), 0.0);  // mirrored
+}
+
 TEST(Deformation, RefusesDisplacementsOfAnotherSizeAndEmptySurfaces) {
   const auto pose = Eigen::Isometry3d::Identity();
   EXPECT_THROW(Deformation(pose, Points(3, 2), Points(3, 3)), std::invalid_argument);

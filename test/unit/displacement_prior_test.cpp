@@ -87,6 +87,28 @@ TEST(DisplacementPrior, DisplacementsAreTheFunctionsWeighted) {
   EXPECT_GT(displacements.cwiseAbs().maxCoeff(), static_cast<float>(kAmplitude));
 }
 
+TEST(DisplacementPrior, GradientsAreTheDifferencesOfDisplacements) {
+  const DisplacementPrior prior(organ(), kLength, kAmplitude, 48);
+  const Eigen::Matrix3Xf coefficients = someCoefficients(48);
+  const Points points = probes();
+  const auto gradients = prior.gradients(points, coefficients);
+  ASSERT_EQ(gradients.size(), 120U);
+  constexpr float kStep = 1e-2F;
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto movedBy = [&](float step) {
+      Points shifted = points;
+      shifted.row(axis).array() += step;
+      return prior.displacements(shifted, coefficients);
+    };
+    const Points differences = (movedBy(kStep) - movedBy(-kStep)) / (2.0F * kStep);
+    for (std::size_t i = 0; i < gradients.size(); ++i) {
+      const Eigen::Vector3f column = gradients[i].col(axis);
+      EXPECT_LT((column - differences.col(static_cast<Eigen::Index>(i))).norm(), 2e-3F);
+      EXPECT_LT(column.norm(), 3.0F);
+    }
+  }
+}
+
 /// Two displacements differ no more than a process of this covariance allows:
 /// |f(p) - f(q)|^2 <= 2 amplitude^2 (1 - exp(-|p - q|^2 / 2 length^2)).
 TEST(DisplacementPrior, IsSmoothFromTheSurfaceThroughTheInside) {

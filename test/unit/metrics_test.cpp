@@ -50,28 +50,44 @@ TEST(SurfaceResidual, MeasuresALiftedHalfOfAGrid) {
   EXPECT_DOUBLE_EQ(surfaceResidual(grid(), seen, 0.001).inlier_fraction, 0.0);
 }
 
+using Jacobians = std::vector<Eigen::Matrix3f>;
+
+/// Of `count` points, stretched along the axes.
+Jacobians stretched(std::size_t count, float x, float y, float z) {
+  return Jacobians(count, Eigen::Vector3f(x, y, z).asDiagonal().toDenseMatrix());
+}
+
 TEST(DisplacementStatistics, OfAUniformShiftAreItsLengthWithoutFolds) {
   Points shift = Points::Zero(3, 121);
   shift.row(0).setConstant(0.003F);
   shift.row(1).setConstant(0.004F);
-  const DisplacementStatistics statistics = displacementStatistics(grid(), shift);
+  const DisplacementStatistics statistics =
+      displacementStatistics(shift, stretched(121, 1.0F, 1.0F, 1.0F));
   EXPECT_NEAR(statistics.rms, 0.005, 1e-7);
   EXPECT_NEAR(statistics.p95, 0.005, 1e-7);
   EXPECT_NEAR(statistics.max, 0.005, 1e-7);
   EXPECT_DOUBLE_EQ(statistics.folded_fraction, 0.0);
+  EXPECT_NEAR(statistics.stretch, 1.0, 1e-6);
+  EXPECT_NEAR(statistics.compression, 1.0, 1e-6);
 }
 
-TEST(DisplacementStatistics, CountsPointsWhereTheSurfaceIsTurnedInsideOut) {
-  const Points points = grid();
-  Points folding = Points::Zero(3, 121);
-  folding.row(0) = -2.0F * points.row(0);  // x -> -x: mirrored everywhere
-  EXPECT_DOUBLE_EQ(displacementStatistics(points, folding).folded_fraction, 1.0);
-  folding.row(0) = -0.5F * points.row(0);  // squeezed, not folded
-  EXPECT_DOUBLE_EQ(displacementStatistics(points, folding).folded_fraction, 0.0);
+TEST(DisplacementStatistics, CountFoldsAndMeasureStretchInAnyOrientation) {
+  Jacobians jacobians = stretched(75, 1.0F, 1.4F, 0.6F);
+  const Jacobians mirrored = stretched(25, 1.0F, -0.9F, 1.1F);
+  jacobians.insert(jacobians.end(), mirrored.begin(), mirrored.end());
+  const Eigen::Matrix3f turn =
+      Eigen::AngleAxisf(1.0F, Eigen::Vector3f(1.0F, 2.0F, 3.0F).normalized()).toRotationMatrix();
+  for (Eigen::Matrix3f& jacobian : jacobians) jacobian = turn * jacobian;
+  const DisplacementStatistics statistics = displacementStatistics(Points::Zero(3, 5), jacobians);
+  EXPECT_DOUBLE_EQ(statistics.folded_fraction, 0.25);
+  EXPECT_NEAR(statistics.stretch, 1.4, 1e-5);
+  EXPECT_NEAR(statistics.compression, 0.6, 1e-5);
 }
 
-TEST(DisplacementStatistics, RefusesDisplacementsOfAnotherSize) {
-  EXPECT_THROW(displacementStatistics(grid(), Points(3, 5)), std::invalid_argument);
+TEST(DisplacementStatistics, NeedDisplacementsAndJacobians) {
+  EXPECT_THROW(displacementStatistics(Points(3, 0), stretched(1, 1.0F, 1.0F, 1.0F)),
+               std::invalid_argument);
+  EXPECT_THROW(displacementStatistics(Points::Zero(3, 5), {}), std::invalid_argument);
 }
 
 }  // namespace
