@@ -4,6 +4,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 #include <stdexcept>
 #include <tuple>
@@ -15,12 +16,6 @@ namespace {
 
 constexpr int kVoxelsAcross = 64;  // of the longest side: about 8,000 voxels on an organ's surface
 
-struct Thinned {
-  std::uint64_t voxel = 0;
-  float distance = 0.0F;  // squared, to the voxel's centre
-  Eigen::Index index = 0;
-};
-
 bool lessByCoordinates(const Points& points, Eigen::Index a, Eigen::Index b) {
   return std::make_tuple(points(0, a), points(1, a), points(2, a)) <
          std::make_tuple(points(0, b), points(1, b), points(2, b));
@@ -31,46 +26,87 @@ std::vector<Eigen::Index> thin(const Points& points) {
   const Eigen::Vector3f lowest = points.rowwise().minCoeff();
   const float longest = (points.rowwise().maxCoeff() - lowest).maxCoeff();
   const float edge = std::max(longest / kVoxelsAcross, 1e-12F);
-  std::vector<Thinned> candidates(static_cast<std::size_t>(points.cols()));
-  for (Eigen::Index i = 0; i < points.cols(); ++i) {
+  struct Voxel {
+    float distance = std::numeric_limits<float>::infinity();  // squared, of the point to the centre
+    int point = 0;
+  };
+  constexpr std::size_t kAcross = kVoxelsAcross + 1;  // the farthest point begins another one
+  std::vector<Voxel> voxels(kAcross * kAcross * kAcross);
+  for (int i = 0; i < points.cols(); ++i) {
     const Eigen::Array3f place = (points.col(i) - lowest).array() / edge;
-    const Eigen::Array3f corner = place.floor();
-    const auto cell = corner.cast<std::uint64_t>().eval();
-    candidates[static_cast<std::size_t>(i)] = {(cell[2] << 42U) | (cell[1] << 21U) | cell[0],
-                                               (place - corner - 0.5F).square().sum(), i};
+    const Eigen::Array3i corner = place.cast<int>().max(0).min(kVoxelsAcross);
+    const float distance = (place - corner.cast<float>() - 0.5F).square().sum();
+    const auto cell = corner.cast<std::size_t>().eval();
+    Voxel& voxel = voxels[(cell[2] * kAcross + cell[1]) * kAcross + cell[0]];
+    if (distance < voxel.distance ||
+        (distance == voxel.distance && lessByCoordinates(points, i, voxel.point))) {
+      voxel = {distance, i};
+    }
   }
-  std::sort(candidates.begin(), candidates.end(), [&](const Thinned& a, const Thinned& b) {
-    if (a.voxel != b.voxel) return a.voxel < b.voxel;
-    if (a.distance != b.distance) return a.distance < b.distance;
-    return lessByCoordinates(points, a.index, b.index);
-  });
   std::vector<Eigen::Index> kept;
-  for (std::size_t k = 0; k < candidates.size(); ++k) {
-    if (k == 0 || candidates[k].voxel != candidates[k - 1].voxel)
-      kept.push_back(candidates[k].index);
+  for (const Voxel& voxel : voxels) {
+    if (std::isfinite(voxel.distance)) kept.push_back(voxel.point);
   }
   return kept;
 }
 
 /// Farthest point sampling (Eldar et al. 1997), started at the point farthest from the centroid.
-std::vector<Eigen::Index> farthestPoints(const Points& points, Eigen::Index count) {
-  const Eigen::ArrayX3f coordinates = points.transpose();  // one axis a column, for the vector unit
-  const auto squaredDistances = [&](const Eigen::Vector3f& p) -> Eigen::ArrayXf {
-    return (coordinates.col(0) - p[0]).square() + (coordinates.col(1) - p[1]).square() +
-           (coordinates.col(2) - p[2]).square();
-  };
-  Eigen::ArrayXf distances = squaredDistances(centroid(points));
-  std::vector<Eigen::Index> chosen;
-  Eigen::Index next = 0;
-  distances.maxCoeff(&next);
-  distances.setConstant(std::numeric_limits<float>::max());
-  while (static_cast<Eigen::Index>(chosen.size()) < count) {
-    chosen.push_back(next);
-    distances = distances.min(squaredDistances(points.col(next)));
-    distances.maxCoeff(&next);
+/// The points are sorted by x: a chosen one is the nearest to few blocks of them.
+class FarthestPoints {
+ public:
+  explicit FarthestPoints(const Points& sorted)
+      : coordinates_(sorted.transpose()),
+        distances_(sorted.cols()),
+        largest_(static_cast<std::size_t>((sorted.cols() + kBlock - 1) / kBlock)) {
+    forget();
+    approach(centroid(sorted));
+    farthest_ = findFarthest();
+    forget();
   }
-  return chosen;
-}
+
+  /// The point farthest from those taken so far.
+  Eigen::Index take() {
+    const Eigen::Index taken = farthest_;
+    approach(coordinates_.row(taken).transpose());
+    farthest_ = findFarthest();
+    return taken;
+  }
+
+ private:
+  static constexpr Eigen::Index kBlock = 64;
+
+  void forget() {
+    distances_.setConstant(std::numeric_limits<float>::max());
+    std::fill(largest_.begin(), largest_.end(), std::numeric_limits<float>::max());
+  }
+
+  void approach(const Eigen::Vector3f& point) {
+    for (std::size_t block = 0; block < largest_.size(); ++block) {
+      const Eigen::Index begin = static_cast<Eigen::Index>(block) * kBlock;
+      const Eigen::Index count = std::min(kBlock, distances_.size() - begin);
+      const auto along = [&](int axis) { return coordinates_.col(axis).segment(begin, count); };
+      const float gap = std::max({along(0)[0] - point[0], point[0] - along(0)[count - 1], 0.0F});
+      if (gap * gap >= largest_[block]) continue;
+      auto distances = distances_.segment(begin, count);
+      distances = distances.min((along(0) - point[0]).square() + (along(1) - point[1]).square() +
+                                (along(2) - point[2]).square());
+      largest_[block] = distances.maxCoeff();
+    }
+  }
+
+  Eigen::Index findFarthest() const {
+    const auto block = std::max_element(largest_.begin(), largest_.end()) - largest_.begin();
+    const Eigen::Index begin = block * kBlock;
+    Eigen::Index within = 0;
+    distances_.segment(begin, std::min(kBlock, distances_.size() - begin)).maxCoeff(&within);
+    return begin + within;
+  }
+
+  Eigen::ArrayX3f coordinates_;  // one axis a column, for the vector unit
+  Eigen::ArrayXf distances_;     // squared, to the nearest point taken
+  std::vector<float> largest_;   // of each block
+  Eigen::Index farthest_ = 0;
+};
 
 }  // namespace
 
@@ -94,8 +130,9 @@ std::vector<Eigen::Index> sampleEvenly(const Points& points, Eigen::Index count)
   std::sort(candidates.begin(), candidates.end(),
             [&](Eigen::Index a, Eigen::Index b) { return lessByCoordinates(points, a, b); });
   if (static_cast<Eigen::Index>(candidates.size()) <= count) return candidates;
-  std::vector<Eigen::Index> chosen = farthestPoints(select(points, candidates), count);
-  for (Eigen::Index& index : chosen) index = candidates[static_cast<std::size_t>(index)];
+  FarthestPoints farthest(select(points, candidates));
+  std::vector<Eigen::Index> chosen(static_cast<std::size_t>(count));
+  for (Eigen::Index& index : chosen) index = candidates[static_cast<std::size_t>(farthest.take())];
   return chosen;
 }
 
