@@ -10,9 +10,15 @@
 #include <vector>
 
 #include "neighbours.hpp"
+#include "unirit/sampling.hpp"
 
 namespace unirit {
 namespace {
+
+// Points of large clouds that a residual looks at, about
+constexpr Eigen::Index kAsked = 10000;    // whose nearest is sought
+constexpr Eigen::Index kSurface = 60000;  // of the moved surface: fewer would lie farther away
+constexpr Eigen::Index kCloud = 20000;    // still many within any tolerance
 
 template <class Row>
 std::vector<float> toVector(const Row& row) {
@@ -21,6 +27,10 @@ std::vector<float> toVector(const Row& row) {
 
 double rootMeanSquare(const Eigen::RowVectorXf& lengths) {
   return std::sqrt(lengths.cast<double>().squaredNorm() / static_cast<double>(lengths.size()));
+}
+
+Points drawn(const Points& points, Eigen::Index count) {
+  return select(points, drawByLot(points, count));
 }
 
 }  // namespace
@@ -52,8 +62,10 @@ Eigen::RowVectorXf nearestDistances(const Points& from, const Points& to) {
 
 SurfaceResidual surfaceResidual(const Points& moved_surface, const Points& cloud,
                                 double inlier_tolerance) {
-  const Eigen::RowVectorXf distances = nearestDistances(cloud, moved_surface);
-  const Eigen::RowVectorXf seen = nearestDistances(moved_surface, cloud);
+  const Eigen::RowVectorXf distances =
+      nearestDistances(drawn(cloud, kAsked), drawn(moved_surface, kSurface));
+  const Eigen::RowVectorXf seen =
+      nearestDistances(drawn(moved_surface, kAsked), drawn(cloud, kCloud));
   const auto tolerance = static_cast<float>(inlier_tolerance);
   SurfaceResidual residual;
   residual.rms = rootMeanSquare(distances);

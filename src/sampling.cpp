@@ -3,7 +3,9 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstring>
 #include <limits>
 #include <numeric>
 #include <stdexcept>
@@ -108,6 +110,14 @@ class FarthestPoints {
   Eigen::Index farthest_ = 0;
 };
 
+/// Uniform in 64 bits, the same for the same point.
+std::uint64_t lot(const Eigen::Vector3f& point) {
+  std::array<std::uint32_t, 3> bits;
+  std::memcpy(bits.data(), point.data(), sizeof(bits));
+  const std::uint64_t first = Random((std::uint64_t{bits[0]} << 32U) | bits[1]).next();
+  return Random(first ^ bits[2]).next();
+}
+
 }  // namespace
 
 Points select(const Points& points, const std::vector<Eigen::Index>& indices) {
@@ -134,6 +144,20 @@ std::vector<Eigen::Index> sampleEvenly(const Points& points, Eigen::Index count)
   std::vector<Eigen::Index> chosen(static_cast<std::size_t>(count));
   for (Eigen::Index& index : chosen) index = candidates[static_cast<std::size_t>(farthest.take())];
   return chosen;
+}
+
+std::vector<Eigen::Index> drawByLot(const Points& points, Eigen::Index count) {
+  if (count < 1) throw std::invalid_argument("count: at least one point must be asked for");
+  std::vector<Eigen::Index> drawn;
+  const bool all = points.cols() <= count;
+  const auto limit =
+      all ? 0
+          : static_cast<std::uint64_t>(
+                std::ldexp(static_cast<double>(count) / static_cast<double>(points.cols()), 64));
+  for (Eigen::Index i = 0; i < points.cols(); ++i) {
+    if (all || lot(points.col(i)) < limit) drawn.push_back(i);
+  }
+  return drawn;
 }
 
 PointCloud sampleByArea(const Surface& mesh, Eigen::Index count, std::uint64_t seed) {

@@ -14,6 +14,10 @@ namespace unirit {
 /// Throws std::invalid_argument where count < 1.
 std::vector<Eigen::Index> sampleEvenly(const Points& points, Eigen::Index count);
 
+/// About `count` of the points, the same share of them everywhere, as columns' indices; all where
+/// there are fewer. A point is drawn by its coordinates alone, in whatever order the cloud stands.
+std::vector<Eigen::Index> drawByLot(const Points& points, Eigen::Index count);
+
 /// `count` points on the triangles of a mesh, uniform by area, with face normals; deterministic
 /// for a seed. Throws std::invalid_argument where the mesh has no face with an area.
 PointCloud sampleByArea(const Surface& mesh, Eigen::Index count, std::uint64_t seed);

@@ -50,6 +50,26 @@ TEST(SurfaceResidual, MeasuresALiftedHalfOfAGrid) {
   EXPECT_DOUBLE_EQ(surfaceResidual(grid(), seen, 0.001).inlier_fraction, 0.0);
 }
 
+TEST(SurfaceResidual, OfLargeCloudsIsThatOfAllTheirPoints) {
+  const Points surface = test::bumpyEllipsoid(70000, 3);
+  Points seen = test::bumpyEllipsoid(50000, 4);
+  Random random(5);
+  for (float& coordinate : seen.reshaped()) {
+    coordinate += static_cast<float>(0.003 * random.normal());
+  }
+  const Eigen::RowVectorXf distances = nearestDistances(seen, surface);
+  const Eigen::RowVectorXf covered = nearestDistances(surface, seen.leftCols(10000));
+  const float tolerance = 0.003F;
+  const SurfaceResidual residual = surfaceResidual(surface, seen, tolerance);
+  const std::vector<float> all(distances.begin(), distances.end());
+  EXPECT_NEAR(residual.median, quantile(all, 0.5), 1e-4);
+  EXPECT_NEAR(residual.p95, quantile(all, 0.95), 3e-4);
+  EXPECT_NEAR(residual.inlier_fraction, (distances.array() <= tolerance).cast<double>().mean(),
+              0.015);
+  EXPECT_NEAR(surfaceResidual(surface, seen.leftCols(10000), tolerance).coverage,
+              (covered.array() <= tolerance).cast<double>().mean(), 0.015);
+}
+
 using Jacobians = std::vector<Eigen::Matrix3f>;
 
 /// Of `count` points, stretched along the axes.

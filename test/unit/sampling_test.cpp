@@ -45,6 +45,34 @@ TEST(SampleEvenly, RefusesToSampleNoPoint) {
   EXPECT_THROW(sampleEvenly(bumpyEllipsoid(10, 1), 0), std::invalid_argument);
 }
 
+TEST(DrawByLot, DrawsTheSamePointsWhateverTheOrderOfTheCloud) {
+  const Points points = bumpyEllipsoid(20000, 6);
+  Points drawn = select(points, drawByLot(points, 3000));
+  const Points other = shuffled(points, 7);
+  const Points drawn_of_other = select(other, drawByLot(other, 3000));
+  EXPECT_NE(drawn, drawn_of_other);  // they stand in the cloud's order
+  EXPECT_EQ(nearestDistances(drawn, drawn_of_other).maxCoeff(), 0.0F);
+  EXPECT_EQ(drawn.cols(), drawn_of_other.cols());
+}
+
+TEST(DrawByLot, DrawsAboutTheShareAskedForEverywhere) {
+  const Points points = bumpyEllipsoid(20000, 8);
+  const Points drawn = select(points, drawByLot(points, 5000));
+  EXPECT_NEAR(static_cast<double>(drawn.cols()), 5000.0, 250.0);  // 4 standard deviations
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto above = [&](const Points& cloud) {
+      return (cloud.row(axis).array() > 0.0F).cast<double>().mean();
+    };
+    EXPECT_NEAR(above(drawn), above(points), 0.03);
+  }
+}
+
+TEST(DrawByLot, KeepsTheWholeOfASmallCloudAndRefusesToDrawNoPoint) {
+  const Points points = bumpyEllipsoid(500, 9);
+  EXPECT_EQ(select(points, drawByLot(points, 500)), points);
+  EXPECT_THROW(drawByLot(points, 0), std::invalid_argument);
+}
+
 TEST(SampleByArea, PutsPointsOnTheSurfaceInProportionToArea) {
   const Surface mesh = box({0.1F, 0.2F, 0.4F});
   const PointCloud samples = sampleByArea(mesh, 20000, 5);
