@@ -48,10 +48,11 @@ void timed(const char* stage, std::vector<StageTime>& stages, Work&& work) {
   stages.push_back({stage, elapsed.count()});
 }
 
-Registration ended(Status status, std::string message) {
+Registration ended(Status status, std::string message, std::vector<PlausibilityCheck> checks = {}) {
   Registration registration;
   registration.status = status;
   registration.message = std::move(message);
+  registration.checks = std::move(checks);
   return registration;
 }
 
@@ -120,6 +121,8 @@ struct Registrar::Implementation {
   Refined refine(const PointCloud& target, const Eigen::Isometry3f& rigid,
                  const Points& displacements);
   Eigen::Isometry3d toMetres(const Eigen::Isometry3f& pose) const;
+  RefinementQuality qualityOf(const Refined& refined, const Points& target,
+                              const Deformation& deformation) const;
   std::shared_ptr<const Deformation> deformationOf(const PointCloud& preoperative,
                                                    const Eigen::Isometry3d& pose,
                                                    const Points& displacements,
@@ -171,9 +174,6 @@ Registration Registrar::Implementation::run(const PointCloud& preoperative,
   if (refines) {
     timed("refine", stages, [&] { refined = refine(target, rigid, displacements); });
     rigid = refined->pose;
-    if (settings.refinement.correspondence == Correspondence::kSurface) {
-      registration.refinement = RefinementQuality{refined->fit, surprise(*refined)};
-    }
   }
 
   timed("assessment", stages, [&] {
@@ -188,7 +188,14 @@ Registration Registrar::Implementation::run(const PointCloud& preoperative,
         displacementStatistics(registration.deformation->displacements(),
                                registration.deformation->jacobians(model->samples));
   });
-  applyChecks(checkOutput(registration, model->extent, settings.plausibility), registration);
+    if (refined && settings.refinement.correspondence == Correspondence::kSurface) {
+      registration.refinement = qualityOf(*refined, target.points, *registration.deformation);
+    }
+    applyChecks({checkOverlap(model->sampled.points, target.points,
+                              model->extent / model->normalisation.scale, settings.plausibility)},
+                registration);
+    applyChecks(checkOutput(registration, guess, model->extent, settings.plausibility),
+                registration);
   return registration;
 }
 
@@ -215,6 +222,7 @@ Refined Registrar::Implementation::refine(const PointCloud& target, const Eigen:
     Refined refined = model->refinement->refine(seen, to_start.linear() * moved);
     refined.pose = start * refined.pose;
     return refined;
+    if (refined.eye) refined.eye = start * *refined.eye;
   };
   Refined from_guess =
       refineFrom(Eigen::Isometry3f::Identity(), Points::Zero(3, model->sampled.size()));
@@ -225,6 +233,14 @@ Refined Registrar::Implementation::refine(const PointCloud& target, const Eigen:
 }
 
 Eigen::Isometry3d Registrar::Implementation::toMetres(const Eigen::Isometry3f& pose) const {
+/// `target`: in the network's unit and the organ's frame.
+RefinementQuality Registrar::Implementation::qualityOf(const Refined& refined, const Points& target,
+                                                       const Deformation& deformation) const {
+  const Agreement agreement = model->refinement->agreement(target, refined);
+  return {refined.fit, surprise(refined), agreement.missing,
+          deformation.confidence(model->samples).mean(), agreement.residual_left};
+}
+
   const auto scale = static_cast<double>(model->normalisation.scale);
   const Eigen::Vector3d offset = model->normalisation.offset.cast<double>();
   Eigen::Isometry3d moved = pose.cast<double>();
@@ -268,19 +284,17 @@ Registration Registrar::registerClouds(const PointCloud& preoperative,
   const PlausibilitySettings& limits = implementation_->settings.plausibility;
   const PointCloud organ = dropInvalid(preoperative);
   const PointCloud seen = dropInvalid(intraoperative);
-  if (auto fault = findFault(organ, "the pre-operative cloud", limits)) {
-    return ended(Status::kInvalidInput, *fault);
-  }
-  if (auto fault = findFault(seen, "the intra-operative cloud", limits)) {
-    return ended(Status::kInvalidInput, *fault);
-  }
-  if (auto fault = findMismatch(organ, seen, limits)) {
-    return ended(Status::kInvalidInput, *fault);
-  }
+  std::vector<PlausibilityCheck> checks;
+  auto fault = findFault(organ, "the pre-operative cloud", limits, checks);
+  if (!fault) fault = findFault(seen, "the intra-operative cloud", limits, checks);
+  if (!fault) fault = findMismatch(organ, seen, limits, checks);
+  if (fault) return ended(Status::kInvalidInput, *fault, std::move(checks));
   if (!guess.matrix().allFinite()) {
     return ended(Status::kInvalidInput, "the initial guess is not finite");
   }
-  return implementation_->run(organ, seen, guess);
+  Registration registration = implementation_->run(organ, seen, guess);
+  registration.checks.insert(registration.checks.begin(), checks.begin(), checks.end());
+  return registration;
 } catch (const std::exception& error) {
   return ended(Status::kFailed, std::string("internal error: ") + error.what());
 }

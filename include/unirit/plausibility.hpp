@@ -16,21 +16,33 @@ namespace unirit {
 struct Registration;
 
 /// Why a cloud cannot be registered, as a sentence that begins with `name`: too few points, all on
-/// one line or in one plane. Nothing where the cloud is fit.
+/// one line or in one plane. Nothing where the cloud is fit. What was measured goes to `checks`.
 std::optional<std::string> findFault(const PointCloud& cloud, const std::string& name,
-                                     const PlausibilitySettings& settings);
+                                     const PlausibilitySettings& settings,
+                                     std::vector<PlausibilityCheck>& checks);
 
 /// Why the two clouds cannot belong together: an extent of the first that no organ has, or of the
 /// second, over that, outside the settings' range. Says so where millimetres taken for metres, or
-/// the reverse, explain it.
+/// the reverse, explain it. What was measured goes to `checks`.
 std::optional<std::string> findMismatch(const PointCloud& preoperative,
                                         const PointCloud& intraoperative,
-                                        const PlausibilitySettings& settings);
+                                        const PlausibilitySettings& settings,
+                                        std::vector<PlausibilityCheck>& checks);
 
-/// Checks of a finished registration: finite, rotation valid, residual, displacement and, where it
-/// was refined, how surprising the displacement is.
-std::vector<PlausibilityCheck> checkOutput(const Registration& registration, double organ_extent,
+/// Whether the cloud lies about where the start has the organ; both 3 x N, in one frame and unit.
+PlausibilityCheck checkOverlap(const Points& predicted, const Points& cloud, double organ_extent,
+                               const PlausibilitySettings& settings);
+
+/// Checks of a finished registration: finite, rotation valid, turn from the start, residual,
+/// displacement, stretch and folds. Where it was refined also what the displacement gained, what of
+/// the organ should be in the cloud and is not, how much was learnt of it, how surprising the
+/// displacement is; and how close all of this together comes to its limits.
+std::vector<PlausibilityCheck> checkOutput(const Registration& registration,
+                                           const Eigen::Isometry3d& start, double organ_extent,
                                            const PlausibilitySettings& settings);
+
+/// Value over limit, or its inverse where the limit is a lower one: above 1 the check failed.
+double closeness(const PlausibilityCheck& check);
 
 /// Checks of the new pose against the last accepted one, measured at the organ's centroid.
 std::vector<PlausibilityCheck> checkJump(const Eigen::Isometry3d& pose,

@@ -45,17 +45,29 @@ struct RefinementSettings {
 /// Limits outside of which a registration is refused. Lengths relative to the organ's extent hold
 /// for organs of any size.
 struct PlausibilitySettings {
-  int min_points = 50;                 ///< points in either cloud, after invalid ones are dropped
-  double min_thickness = 0.005;        ///< second and third principal deviation over the first
-  double min_organ_extent = 0.01;      ///< of the pre-operative cloud [m]
-  double max_organ_extent = 1.0;       ///< same, from above [m]
-  double min_extent_ratio = 0.1;       ///< extent of the intra-operative cloud over the organ's
-  double max_extent_ratio = 3.0;       ///< same, from above
-  double inlier_tolerance = 0.005;     ///< cloud points nearer than this are inliers [m]
-  double max_residual = 0.06;          ///< median distance of cloud to moved surface, over extent
-  double max_residual_p95 = 0.12;      ///< same, 95th percentile
-  double max_surprise = 1.15;          ///< RefinementQuality::surprise; limit from training organs
-  double max_displacement = 0.35;      ///< largest non-rigid displacement, over extent
+  int min_points = 50;              ///< points in either cloud, after invalid ones are dropped
+  double min_thickness = 0.005;     ///< second and third principal deviation over the first
+  double min_organ_extent = 0.01;   ///< of the pre-operative cloud [m]
+  double max_organ_extent = 1.0;    ///< same, from above [m]
+  double min_extent_ratio = 0.1;    ///< extent of the intra-operative cloud over the organ's
+  double max_extent_ratio = 3.0;    ///< same, from above
+  double min_overlap = 0.4;         ///< share of the cloud within a tenth of the extent of where
+                                    ///< the start has the organ
+  double inlier_tolerance = 0.005;  ///< cloud points nearer than this are inliers [m]
+  double max_residual = 0.06;       ///< median distance of cloud to moved surface, over extent
+  double max_residual_p95 = 0.125;  ///< same, 95th percentile
+  double min_inliers = 0.2;         ///< share of inliers in the cloud
+  double max_residual_left = 1.1;   ///< RefinementQuality::residual_left
+  double max_missing = 0.12;        ///< RefinementQuality::missing
+  double min_confidence = 0.38;     ///< RefinementQuality::confidence
+  double max_surprise = 1.3;        ///< RefinementQuality::surprise
+  double max_displacement = 0.25;   ///< largest non-rigid displacement, over extent
+  double max_stretch = 2.0;         ///< DisplacementStatistics::stretch
+  double min_compression = 0.1;     ///< DisplacementStatistics::compression
+  double max_folded = 0.02;         ///< DisplacementStatistics::folded_fraction
+  double max_turn = 60.0;           ///< of the organ from the start [degree]
+  double max_joint = 0.61;          ///< root mean square of turn, 95th percentile of the residual,
+                                    ///< missing, confidence and surprise, over their limits
   double max_jump_translation = 0.10;  ///< from the last accepted pose, at the organ's centroid [m]
   double max_jump_rotation = 60.0;     ///< from the last accepted pose [degree]
 };
@@ -133,14 +145,33 @@ void visitSettings(Settings& settings, Visitor&& visitor) {
 }
 
 /// Throws std::invalid_argument naming the first setting outside its range, its value and the
+  visitor("plausibility/min_overlap", p.min_overlap, 0.0, 1.0,
+          "share of the cloud within a tenth of the extent of where the start has the organ");
 /// range.
 void validate(const RegistrationSettings& settings);
 
 /// Settings as a flat JSON object of the names above (plus stages, pairing); what result files
 /// carry.
 std::string toJson(const RegistrationSettings& settings);
+  visitor("plausibility/min_inliers", p.min_inliers, 0.0, 1.0, "share of inliers, at least");
+  visitor("plausibility/max_residual_left", p.max_residual_left, 0.0, 10.0,
+          "residual over that of the rigid part alone, at most");
+  visitor("plausibility/max_missing", p.max_missing, 0.0, 1.0,
+          "share of the organ's side in view without a cloud point nearby, at most");
+  visitor("plausibility/min_confidence", p.min_confidence, 0.0, 1.0,
+          "mean confidence over the organ, at least");
 
 /// SHA-256 (hex) of toJson.
 std::string sha256(const RegistrationSettings& settings);
 
+  visitor("plausibility/max_stretch", p.max_stretch, 1.0, 100.0,
+          "largest principal stretch, 95th percentile over the organ, at most");
+  visitor("plausibility/min_compression", p.min_compression, 0.0, 1.0,
+          "smallest principal stretch, 5th percentile over the organ, at least");
+  visitor("plausibility/max_folded", p.max_folded, 0.0, 1.0,
+          "share of the organ where the deformation folds, at most");
+  visitor("plausibility/max_turn", p.max_turn, 0.0, 180.0,
+          "rotation from the start, at most [degree]");
+  visitor("plausibility/max_joint", p.max_joint, 0.0, 10.0,
+          "root mean square of turn, residual, missing, confidence and surprise over their limits");
 }  // namespace unirit

@@ -25,6 +25,7 @@ struct PlausibilityCheck {
   double value = 0.0;
   double limit = 0.0;
   bool passed = true;
+  bool at_least = false;  ///< the limit is the smallest value that passes, else the largest
 };
 
 }  // namespace unirit

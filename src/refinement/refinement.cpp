@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "unirit/metrics.hpp"
 #include "unirit/normals.hpp"
 
 namespace unirit {
@@ -26,6 +27,7 @@ constexpr float kSurfaceWeight = 0.3F;
 // Mean normal of a surface seen from all sides, at most; a viewpoint speaks for one side
 constexpr double kWholeOpenness = 0.25;
 constexpr double kWholeOpennessFromViewpoint = 0.1;
+constexpr float kNearby = 0.1F;         // a point without a neighbour within it is not seen
 constexpr float kFar = 8.0F;            // a viewpoint that is not known lies so far away
 constexpr float kGrazingCosine = 0.2F;  // surely seen from kGrazingCosine + kGrazingRange on
 constexpr float kGrazingRange = 0.3F;
@@ -117,7 +119,19 @@ Refined Refinement::refine(const PointCloud& target, const Points& displacements
     solver_.solve(correspondences_, trust(sigma, points ? kPointsAcross : kSurfaceAcross), state);
   }
   expect(last);
-  return {state.pose, state.coefficients, solver_.covarianceFactor(), whole, correspondences_.fit};
+  return {state.pose, state.coefficients,   solver_.covarianceFactor(),
+          whole,      correspondences_.fit, eye};
+}
+
+Agreement Refinement::agreement(const Points& target, const Refined& refined) const {
+  const Points bent = source_.points + prior_->displacements(source_.points, refined.coefficients);
+  const PointCloud moved{refined.pose * bent, refined.pose.linear() * source_.normals};
+  const Eigen::RowVectorXf visible = visibility(moved, refined.eye);
+  const auto lonely = (nearestDistances(moved.points, target).array() > kNearby).cast<float>();
+  const float rigid = nearestDistances(target, refined.pose * source_.points).norm();
+  const float left = nearestDistances(target, moved.points).norm();
+  return {(lonely * visible.array()).sum() / std::max(visible.sum(), 1.0F),
+          rigid > 0.0F ? left / rigid : 1.0F};
 }
 
 }  // namespace unirit

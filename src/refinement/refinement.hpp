@@ -14,10 +14,17 @@ namespace unirit {
 /// What the refinement found: p -> pose * (p + prior->displacements(p, coefficients)).
 struct Refined {
   Eigen::Isometry3f pose = Eigen::Isometry3f::Identity();
-  Eigen::Matrix3Xf coefficients;      ///< 3 x rank
-  Eigen::MatrixXf covariance_factor;  ///< CoherentSolver::covarianceFactor
-  bool whole = false;                 ///< the target was taken for the whole surface
-  double fit = 0.0;                   ///< Correspondences::fit at the end
+  Eigen::Matrix3Xf coefficients;       ///< 3 x rank
+  Eigen::MatrixXf covariance_factor;   ///< CoherentSolver::covarianceFactor
+  bool whole = false;                  ///< the target was taken for the whole surface
+  double fit = 0.0;                    ///< Correspondences::fit at the end
+  std::optional<Eigen::Vector3f> eye;  ///< from where a part is seen, the target's frame
+};
+
+/// How far a refined organ and the cloud agree, beside the likelihood that was sought.
+struct Agreement {
+  double missing = 0.0;        ///< RefinementQuality::missing
+  double residual_left = 1.0;  ///< RefinementQuality::residual_left
 };
 
 /// The coherent refinement: expectation maximisation of pose and smooth displacement, annealed from
@@ -33,6 +40,9 @@ class Refinement {
   /// its viewpoint in the same frame, if known. `displacements`: 3 x N, of the source, where the
   /// search begins.
   Refined refine(const PointCloud& target, const Points& displacements);
+
+  /// `target`: 3 x M, the points that were refined to; `refined` in the same frame.
+  Agreement agreement(const Points& target, const Refined& refined) const;
 
   const std::shared_ptr<const DisplacementPrior>& prior() const { return prior_; }
   const PointCloud& source() const { return source_; }

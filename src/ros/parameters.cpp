@@ -197,3 +197,13 @@ PlausibilitySettings fromConfig(const UniritConfig& config) {
 }
 
 }  // namespace unirit
+  settings.min_overlap = config.min_overlap;
+  settings.min_inliers = config.min_inliers;
+  settings.max_residual_left = config.max_residual_left;
+  settings.max_missing = config.max_missing;
+  settings.min_confidence = config.min_confidence;
+  settings.max_stretch = config.max_stretch;
+  settings.min_compression = config.min_compression;
+  settings.max_folded = config.max_folded;
+  settings.max_turn = config.max_turn;
+  settings.max_joint = config.max_joint;

@@ -4,36 +4,16 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <iostream>
 #include <memory>
 #include <stdexcept>
 
+#include "chosen_organs.hpp"
 #include "unirit/evaluation/case_folder.hpp"
 #include "unirit/evaluation/pair_set.hpp"
-#include "unirit/io/organ_folder.hpp"
 #include "unirit/random.hpp"
-#include "unirit/simulation/phantom.hpp"
 
 namespace unirit {
 namespace {
-
-constexpr double kMillimetre = 0.001;
-constexpr std::uint64_t kUnseenPatients = 900000000;  // phantom seeds that training never draws
-
-std::vector<Organ> organsOf(const BenchmarkOptions& options) {
-  if (!options.data.empty()) {
-    return readOrgans(options.data, kMillimetre, options.exclude, [](const std::string& sentence) {
-      std::cerr << "left out: " << sentence << '\n';
-    });
-  }
-  std::vector<Organ> organs;
-  for (const std::string& name : phantomOrgans()) {
-    for (int i = 0; i < options.phantoms; ++i) {
-      organs.push_back({name, std::to_string(i), makePhantom(name, kUnseenPatients + i)});
-    }
-  }
-  return organs;
-}
 
 /// Turns both clouds together: the problem stays the same, but the network was made for organs as
 /// scanners lay them.
@@ -89,7 +69,8 @@ std::vector<BenchmarkCase> pairSetCases(const BenchmarkOptions& options) {
 }
 
 std::vector<BenchmarkCase> madeCases(const BenchmarkOptions& options) {
-  const auto organs = std::make_shared<const std::vector<Organ>>(organsOf(options));
+  const auto organs = std::make_shared<const std::vector<Organ>>(
+      chosenOrgans(options.data, options.exclude, options.phantoms));
   const std::string label = labelOf(options);
   std::vector<BenchmarkCase> cases;
   for (const std::string& name : options.protocols) {

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "shapes.hpp"
@@ -13,8 +14,15 @@ namespace {
 
 const PlausibilitySettings kDefaults;
 
+bool allPassed(const std::vector<PlausibilityCheck>& checks) {
+  return std::all_of(checks.begin(), checks.end(), [](const auto& check) { return check.passed; });
+}
+
 std::string faultOf(const Points& points) {
-  return findFault({points, {}}, "the cloud", kDefaults).value_or("");
+  std::vector<PlausibilityCheck> checks;
+  const std::string fault = findFault({points, {}}, "the cloud", kDefaults, checks).value_or("");
+  EXPECT_EQ(allPassed(checks), fault.empty()) << fault;
+  return fault;
 }
 
 /// Of an organ of 0.2 m and what is seen of it, both in other units.
@@ -23,7 +31,11 @@ std::string mismatchOf(double seen_scale, double organ_scale = 1.0) {
   const auto scaled = [&](double scale) {
     return PointCloud{static_cast<float>(scale) * points, {}};
   };
-  return findMismatch(scaled(organ_scale), scaled(seen_scale), kDefaults).value_or("");
+  std::vector<PlausibilityCheck> checks;
+  const std::string mismatch =
+      findMismatch(scaled(organ_scale), scaled(seen_scale), kDefaults, checks).value_or("");
+  EXPECT_EQ(allPassed(checks), mismatch.empty()) << mismatch;
+  return mismatch;
 }
 
 void expectNames(const std::string& sentence, const std::string& cloud, const std::string& cause) {
@@ -38,12 +50,26 @@ Registration plausible() {
   const Points surface = test::bumpyEllipsoid(100, 2);
   registration.deformation = std::make_shared<const Deformation>(Eigen::Isometry3d::Identity(),
                                                                  surface, Points::Zero(3, 100));
+  registration.residual.inlier_fraction = 0.9;
+  return registration;
+}
+
+/// The same, refined.
+Registration plausiblyRefined() {
+  Registration registration = plausible();
+  RefinementQuality quality;
+  quality.surprise = 0.8;
+  quality.missing = 0.01;
+  quality.confidence = 0.6;
+  quality.residual_left = 0.6;
+  registration.refinement = quality;
   return registration;
 }
 
 std::string refusalOf(Registration registration) {
-  applyChecks(checkOutput(registration, 0.2, kDefaults), registration);
-  EXPECT_EQ(registration.checks.size(), registration.refinement ? 6U : 5U);
+  applyChecks(checkOutput(registration, Eigen::Isometry3d::Identity(), 0.2, kDefaults),
+              registration);
+  EXPECT_EQ(registration.checks.size(), registration.refinement ? 15U : 10U);
   return registration.succeeded() ? "" : registration.message;
 }
 
@@ -59,7 +85,6 @@ TEST(FindFault, NamesEmptyTinyPlanarCollinearAndRepeatedClouds) {
   Points collinear = organ;
   collinear.bottomRows(2).setConstant(0.3F);
   EXPECT_NE(faultOf(collinear).find("collinear"), std::string::npos);
-  EXPECT_NE(faultOf(Points::Constant(3, 100, 1.0F)).find("single point"), std::string::npos);
 }
 
 const char* const kMillimetres = "is it in millimetres, read as metres?";
@@ -96,7 +121,29 @@ TEST(FindMismatch, NamesOtherExtentsWithoutAskingForUnits) {
   EXPECT_EQ((huge + dot).find("read as"), std::string::npos);
 }
 
-TEST(CheckOutput, PassesAPlausibleRegistration) { EXPECT_EQ(refusalOf(plausible()), ""); }
+TEST(FindFault, NamesAPointRepeated) {
+  std::vector<PlausibilityCheck> checks;
+  const auto fault =
+      findFault({Points::Constant(3, 100, 1.0F), {}}, "the cloud", kDefaults, checks);
+  EXPECT_EQ(fault.value_or(""), "the cloud is a single point, repeated");
+}
+
+TEST(CheckOverlap, RefusesCloudsFarFromWhereTheStartHasTheOrgan) {
+  const Points organ = test::bumpyEllipsoid(800, 1);
+  Points cloud = test::bumpyEllipsoid(400, 2);
+  const PlausibilityCheck near = checkOverlap(organ, cloud, 0.2, kDefaults);
+  EXPECT_DOUBLE_EQ(near.value, 1.0);
+  EXPECT_TRUE(near.passed);
+  cloud.leftCols(100).row(0).array() += 0.5F;
+  EXPECT_DOUBLE_EQ(checkOverlap(organ, cloud, 0.2, kDefaults).value, 0.75);
+  cloud.row(0).array() += 0.5F;
+  EXPECT_FALSE(checkOverlap(organ, cloud, 0.2, kDefaults).passed);
+}
+
+TEST(CheckOutput, PassesAPlausibleRegistration) {
+  EXPECT_EQ(refusalOf(plausible()), "");
+  EXPECT_EQ(refusalOf(plausiblyRefined()), "");
+}
 
 TEST(CheckOutput, RefusesWhatIsNotFinite) {
   Registration registration = plausible();
@@ -112,7 +159,7 @@ TEST(CheckOutput, RefusesRotationsThatAreNone) {
   EXPECT_NE(refusalOf(registration).find("rotation error"), std::string::npos);
 }
 
-TEST(CheckOutput, RefusesLargeResidualsAndDisplacementsNamingValueAndLimit) {
+TEST(CheckOutput, RefusesLargeResidualsNamingValueAndLimit) {
   Registration registration = plausible();
   registration.residual.median = 0.02;
   EXPECT_EQ(refusalOf(registration),
@@ -121,17 +168,70 @@ TEST(CheckOutput, RefusesLargeResidualsAndDisplacementsNamingValueAndLimit) {
   registration.residual.p95 = 0.03;
   EXPECT_EQ(refusalOf(registration),
             "refused: 95th percentile of the surface residual over extent is 0.15, the limit is "
-            "0.12");
+            "0.125");
   registration = plausible();
-  registration.refinement = RefinementQuality{-5.0, 1.0};
-  EXPECT_EQ(refusalOf(registration), "");
-  registration.refinement->surprise = 1.5;
+  registration.residual.inlier_fraction = 0.1;
+  EXPECT_EQ(refusalOf(registration), "refused: share of inliers is 0.1, at least 0.2 is asked for");
+}
+
+TEST(CheckOutput, RefusesFarTurnsFromTheStart) {
+  Registration registration = plausible();
+  registration.T_intraoperative_preoperative.rotate(
+      Eigen::AngleAxisd(M_PI / 2.0, Eigen::Vector3d::UnitY()));
   EXPECT_EQ(refusalOf(registration),
-            "refused: surprise of the displacement is 1.5, the limit is 1.15");
-  registration = plausible();
+            "refused: turn from the start [degree] is 90, the limit is 60");
+}
+
+TEST(CheckOutput, RefusesImplausibleDeformations) {
+  Registration registration = plausible();
   registration.displacement.max = 0.1;
   EXPECT_EQ(refusalOf(registration),
-            "refused: largest displacement over extent is 0.5, the limit is 0.35");
+            "refused: largest displacement over extent is 0.5, the limit is 0.25");
+  registration = plausible();
+  registration.displacement.stretch = 3.0;
+  EXPECT_EQ(refusalOf(registration), "refused: stretch is 3, the limit is 2");
+  registration = plausible();
+  registration.displacement.compression = 0.05;
+  EXPECT_EQ(refusalOf(registration), "refused: compression is 0.05, at least 0.1 is asked for");
+  registration = plausible();
+  registration.displacement.folded_fraction = 0.1;
+  EXPECT_EQ(refusalOf(registration), "refused: share folded over is 0.1, the limit is 0.02");
+}
+
+TEST(CheckOutput, RefusesWhatTheRefinementShouldNotHaveFound) {
+  Registration registration = plausiblyRefined();
+  registration.refinement->residual_left = 1.2;
+  EXPECT_EQ(refusalOf(registration),
+            "refused: residual over that of the rigid part is 1.2, the limit is 1.1");
+  registration = plausiblyRefined();
+  registration.refinement->missing = 0.5;
+  EXPECT_EQ(refusalOf(registration),
+            "refused: share in view that is missing is 0.5, the limit is 0.12");
+  registration = plausiblyRefined();
+  registration.refinement->confidence = 0.2;
+  EXPECT_EQ(refusalOf(registration), "refused: mean confidence is 0.2, at least 0.38 is asked for");
+  registration = plausiblyRefined();
+  registration.refinement->surprise = 1.5;
+  EXPECT_EQ(refusalOf(registration),
+            "refused: surprise of the displacement is 1.5, the limit is 1.3");
+}
+
+TEST(CheckOutput, RefusesWhatIsCloseToAllLimitsAtOnce) {
+  Registration registration = plausiblyRefined();
+  registration.refinement->surprise = 1.25;
+  EXPECT_EQ(refusalOf(registration), "");  // close to one
+  registration.refinement->missing = 0.1;
+  registration.refinement->confidence = 0.4;
+  registration.residual.p95 = 0.022;
+  EXPECT_EQ(refusalOf(registration).rfind("refused: closeness to the limits of turn", 0), 0U);
+}
+
+TEST(Closeness, IsAboveOneWhereACheckFails) {
+  EXPECT_DOUBLE_EQ(closeness({"at most", 1.0, 2.0, true, false}), 0.5);
+  EXPECT_DOUBLE_EQ(closeness({"at most", 4.0, 2.0, false, false}), 2.0);
+  EXPECT_DOUBLE_EQ(closeness({"at least", 4.0, 2.0, true, true}), 0.5);
+  EXPECT_DOUBLE_EQ(closeness({"at least", 1.0, 2.0, false, true}), 2.0);
+  EXPECT_DOUBLE_EQ(closeness({"nothing is asked", 0.0, 0.0, true, true}), 0.0);
 }
 
 TEST(CheckJump, MeasuresAtTheOrgansCentroid) {

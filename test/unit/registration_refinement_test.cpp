@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <gtest/gtest.h>
 
+#include "lenient_limits.hpp"
 #include "unirit/evaluation/pair.hpp"
 #include "unirit/registration.hpp"
 #include "unirit/simulation/phantom.hpp"
@@ -26,9 +27,7 @@ Registration registered(const PointCloud& preoperative, const PointCloud& intrao
   RegistrationSettings settings;
   settings.stages = stages;
   settings.refinement.correspondence = correspondence;
-  settings.plausibility.max_residual = settings.plausibility.max_residual_p95 = 1.0;
-  settings.plausibility.max_surprise = 10.0;
-  settings.plausibility.max_displacement = 2.0;
+  settings.plausibility = test::lenientLimits();
   Registrar registrar(weights, settings);
   return registrar.registerClouds(preoperative, intraoperative, Eigen::Isometry3d::Identity());
 }

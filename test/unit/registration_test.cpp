@@ -5,6 +5,7 @@
 
 #include <limits>
 
+#include "lenient_limits.hpp"
 #include "shapes.hpp"
 
 namespace unirit {
@@ -21,9 +22,7 @@ std::shared_ptr<const Weights> weights() {
 /// Limits that random weights do not reach.
 RegistrationSettings lenient() {
   RegistrationSettings settings;
-  settings.plausibility.max_residual = settings.plausibility.max_residual_p95 = 1.0;
-  settings.plausibility.max_surprise = 10.0;
-  settings.plausibility.max_displacement = 2.0;
+  settings.plausibility = test::lenientLimits();
   return settings;
 }
 
