@@ -84,25 +84,25 @@ class InterpolatedField : public DisplacementField {
 
 Deformation::Deformation(const Eigen::Isometry3d& T_intraoperative_preoperative, Points surface,
                          Points displacements)
-    : T_intraoperative_preoperative_(T_intraoperative_preoperative),
-      surface_(std::move(surface)),
-      displacements_(std::move(displacements)) {
-  if (surface_.cols() != displacements_.cols() || surface_.cols() == 0) {
-    throw std::invalid_argument("displacements: must be as many as the surface points, at least 1");
-  }
-  field_ = std::make_shared<const InterpolatedField>(surface_, displacements_);
-}
+    : Deformation(T_intraoperative_preoperative, surface,
+                  std::make_shared<const InterpolatedField>(surface, displacements),
+                  {displacements, {}}) {}
 
 Deformation::Deformation(const Eigen::Isometry3d& T_intraoperative_preoperative, Points surface,
-                         std::shared_ptr<const DisplacementField> field)
+                         std::shared_ptr<const DisplacementField> field, FieldValues at_surface)
     : T_intraoperative_preoperative_(T_intraoperative_preoperative),
       surface_(std::move(surface)),
-      field_(std::move(field)) {
+      field_(std::move(field)),
+      at_surface_(std::move(at_surface)) {
   if (!field_) throw std::invalid_argument("field: none was given");
-  displacements_ = field_->displacements(surface_);
+  const Eigen::Index count = surface_.cols(), sure = at_surface_.confidence.size();
+  if (at_surface_.displacements.cols() != count || (sure != 0 && sure != count) || count == 0) {
+    throw std::invalid_argument(
+        "displacements, confidence: must be as many as the surface points, at least 1");
+  }
 }
 
-Points Deformation::movedSurface() const { return moveRigidly(surface_) + displacements_; }
+Points Deformation::movedSurface() const { return moveRigidly(surface_) + displacements(); }
 
 Points Deformation::move(const Points& preoperative) const {
   return moveRigidly(preoperative) + field_->displacements(preoperative);

@@ -82,6 +82,7 @@ struct Registrar::Implementation {
     Normalisation normalisation;
     double extent = 0.0;  // [m]
     std::unique_ptr<Refinement> refinement;
+    Eigen::MatrixXf functions;  // the refinement's prior's, at every point
   };
 
   Implementation(std::shared_ptr<const Weights> new_weights,
@@ -104,12 +105,12 @@ struct Registrar::Implementation {
     const auto samples = sampleEvenly(preoperative.points, settings.sampling.points);
     fresh->samples = select(preoperative.points, samples);
     fresh->normalisation = Normalisation::of(fresh->samples);
-    fresh->sampled = {fresh->normalisation.apply(fresh->samples),
-                      normalsOf(preoperative, samples)};
+    fresh->sampled = {fresh->normalisation.apply(fresh->samples), normalsOf(preoperative, samples)};
     fresh->vertices = fresh->normalisation.apply(preoperative.points);
     if (contains(settings.stages, Stage::kRefine)) {
       fresh->refinement =
           std::make_unique<Refinement>(fresh->sampled, settings.refinement, selectKernels(), team);
+      fresh->functions = fresh->refinement->prior()->functions(fresh->vertices, team);
     }
     model = std::move(fresh);
   }
@@ -127,7 +128,7 @@ struct Registrar::Implementation {
                                                    const Eigen::Isometry3d& pose,
                                                    const Points& displacements,
                                                    const Eigen::Matrix3f& turn,
-                                                   const std::optional<Refined>& refined) const;
+                                                   const std::optional<Refined>& refined);
 
   std::shared_ptr<const Weights> weights;
   RegistrationSettings settings;
@@ -188,14 +189,13 @@ Registration Registrar::Implementation::run(const PointCloud& preoperative,
         displacementStatistics(registration.deformation->displacements(),
                                registration.deformation->jacobians(model->samples));
   });
-    if (refined && settings.refinement.correspondence == Correspondence::kSurface) {
-      registration.refinement = qualityOf(*refined, target.points, *registration.deformation);
-    }
-    applyChecks({checkOverlap(model->sampled.points, target.points,
-                              model->extent / model->normalisation.scale, settings.plausibility)},
-                registration);
-    applyChecks(checkOutput(registration, guess, model->extent, settings.plausibility),
-                registration);
+  if (refined && settings.refinement.correspondence == Correspondence::kSurface) {
+    registration.refinement = qualityOf(*refined, target.points, *registration.deformation);
+  }
+  applyChecks({checkOverlap(model->sampled.points, target.points,
+                            model->extent / model->normalisation.scale, settings.plausibility)},
+              registration);
+  applyChecks(checkOutput(registration, guess, model->extent, settings.plausibility), registration);
   return registration;
 }
 
@@ -233,13 +233,13 @@ Refined Registrar::Implementation::refine(const PointCloud& target, const Eigen:
 }
 
 Eigen::Isometry3d Registrar::Implementation::toMetres(const Eigen::Isometry3f& pose) const {
-/// `target`: in the network's unit and the organ's frame.
-RefinementQuality Registrar::Implementation::qualityOf(const Refined& refined, const Points& target,
-                                                       const Deformation& deformation) const {
-  const Agreement agreement = model->refinement->agreement(target, refined);
-  return {refined.fit, surprise(refined), agreement.missing,
-          deformation.confidence(model->samples).mean(), agreement.residual_left};
-}
+  /// `target`: in the network's unit and the organ's frame.
+  RefinementQuality Registrar::Implementation::qualityOf(
+      const Refined& refined, const Points& target, const Deformation& deformation) const {
+    const Agreement agreement = model->refinement->agreement(target, refined);
+    return {refined.fit, surprise(refined), agreement.missing,
+            deformation.confidence(model->samples).mean(), agreement.residual_left};
+  }
 
   const auto scale = static_cast<double>(model->normalisation.scale);
   const Eigen::Vector3d offset = model->normalisation.offset.cast<double>();
@@ -252,13 +252,13 @@ RefinementQuality Registrar::Implementation::qualityOf(const Refined& refined, c
 /// `displacements`: of every point of the organ, in the network's unit, where nothing was refined.
 std::shared_ptr<const Deformation> Registrar::Implementation::deformationOf(
     const PointCloud& preoperative, const Eigen::Isometry3d& pose, const Points& displacements,
-    const Eigen::Matrix3f& turn, const std::optional<Refined>& refined) const {
+    const Eigen::Matrix3f& turn, const std::optional<Refined>& refined) {
   if (refined) {
-    return std::make_shared<const Deformation>(
-        pose, preoperative.points,
-        std::make_shared<const CoherentField>(model->refinement->prior(), model->normalisation,
-                                              pose.linear().cast<float>(), refined->coefficients,
-                                              refined->covariance_factor));
+    const auto field = std::make_shared<const CoherentField>(
+        model->refinement->prior(), model->normalisation, pose.linear().cast<float>(),
+        refined->coefficients, refined->covariance_factor);
+    return std::make_shared<const Deformation>(pose, preoperative.points, field,
+                                               field->valuesAt(model->functions, team));
   }
   return std::make_shared<const Deformation>(pose, preoperative.points,
                                              turn * displacements * model->normalisation.scale);

@@ -26,6 +26,13 @@ class DisplacementField {
   virtual Eigen::RowVectorXf confidence(const Points& preoperative) const = 0;
 };
 
+/// What a field says of points: its displacements, 3 x Q [m], and its confidence, a row of Q or
+/// empty.
+struct FieldValues {
+  Points displacements;
+  Eigen::RowVectorXf confidence;
+};
+
 /// Takes points of the pre-operative frame to the intra-operative one: the rigid transform, then a
 /// displacement. Immutable, so safe to read from any thread.
 class Deformation {
@@ -36,9 +43,10 @@ class Deformation {
   Deformation(const Eigen::Isometry3d& T_intraoperative_preoperative, Points surface,
               Points displacements);
 
-  /// The same with a field of displacements. Throws std::invalid_argument where there is none.
+  /// The same with a field of displacements and what it says of the surface points. Throws
+  /// std::invalid_argument where there is no field or sizes differ.
   Deformation(const Eigen::Isometry3d& T_intraoperative_preoperative, Points surface,
-              std::shared_ptr<const DisplacementField> field);
+              std::shared_ptr<const DisplacementField> field, FieldValues at_surface);
 
   /// The surface points, moved by the whole registration; same order.
   Points movedSurface() const;
@@ -57,13 +65,16 @@ class Deformation {
   Eigen::RowVectorXf confidence(const Points& preoperative) const;
 
   const Eigen::Isometry3d& rigidTransform() const { return T_intraoperative_preoperative_; }
-  const Points& displacements() const { return displacements_; }
+
+  /// Of the surface points.
+  const Points& displacements() const { return at_surface_.displacements; }
+  const Eigen::RowVectorXf& confidence() const { return at_surface_.confidence; }
 
  private:
   Eigen::Isometry3d T_intraoperative_preoperative_;
   Points surface_;
   std::shared_ptr<const DisplacementField> field_;
-  Points displacements_;
+  FieldValues at_surface_;
 };
 
 }  // namespace unirit

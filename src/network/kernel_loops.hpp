@@ -228,8 +228,21 @@ struct Loops {
     for (int k = 0; k < 7; ++k) sums[k] = sum(totals[k]);
   }
 
+  static void gaussians(const float* queries, long query_count, const float* const* targets,
+                        long target_count, float exponent, float* values) {
+    for (long q = 0; q < query_count; ++q) {
+      const float* query = queries + 3 * q;
+      for (long j = 0; j < target_count; j += Lanes) {
+        const Vector dx = load(targets[0] + j) - query[0];
+        const Vector dy = load(targets[1] + j) - query[1];
+        const Vector dz = load(targets[2] + j) - query[2];
+        store(exponential(exponent * (dx * dx + dy * dy + dz * dz)), values + q * target_count + j);
+      }
+    }
+  }
+
   static constexpr Kernels kernels(InstructionSet instruction_set) {
-    return {instruction_set, kWidth, dense, denseMaximum, nearest, affinities, gather};
+    return {instruction_set, kWidth, dense, denseMaximum, nearest, affinities, gather, gaussians};
   }
 };
 

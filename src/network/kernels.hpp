@@ -79,6 +79,11 @@ struct Kernels {
   void (*gather)(const float* source, const OrientedPointsView& targets, const int* blocks,
                  long block_count, const AffinityView& affinity, const float* target_weights,
                  float source_weight, float* sums);
+
+  /// values[q][j] = e^(exponent * squared distance of query q to target j). Queries are x y z, ...,
+  /// targets one coordinate an array, in whole blocks of kPointBlock.
+  void (*gaussians)(const float* queries, long query_count, const float* const* targets,
+                    long target_count, float exponent, float* values);
 };
 
 /// What this processor can run, from the baseline up.

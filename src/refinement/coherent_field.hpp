@@ -22,11 +22,16 @@ class CoherentField : public DisplacementField {
   std::vector<Eigen::Matrix3f> gradients(const Points& preoperative) const override;
   Eigen::RowVectorXf confidence(const Points& preoperative) const override;
 
+  /// The same at points where the values of the prior's functions, rank x Q, are known.
+  FieldValues valuesAt(const Eigen::MatrixXf& functions, ThreadTeam& team) const;
+
  private:
   std::shared_ptr<const DisplacementPrior> prior_;
   Normalisation normalisation_;
   Eigen::Matrix3Xf coefficients_;  // [m], intra-operative frame
-  Eigen::MatrixXf learnt_;  // covariance of the coefficients that the cloud took away, all axes
+  const Kernels& kernels_;
+  DenseLayer product_;  // of the functions: with the covariance of the coefficients that the cloud
+                        // took away, all axes; and with the coefficients
 };
 
 }  // namespace unirit

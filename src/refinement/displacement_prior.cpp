@@ -11,17 +11,25 @@ namespace unirit {
 namespace {
 
 constexpr Eigen::Index kInducingPoints = 128;
-constexpr double kJitter = 1e-5;       // of the variance: keeps the covariance positive definite
-constexpr Eigen::Index kBlock = 1024;  // points evaluated together, to stay in the cache
+constexpr double kJitter = 1e-5;      // of the variance: keeps the covariance positive definite
+constexpr Eigen::Index kBlock = 192;  // points evaluated together, to stay in the cache
+constexpr float kFarAway = 1e6F;      // where the padding lies
 
 }  // namespace
 
 DisplacementPrior::DisplacementPrior(const Points& surface, double length, double amplitude,
-                                     int rank)
-    : inducing_(select(surface, sampleEvenly(surface, kInducingPoints))),
+                                     int rank, const Kernels& kernels)
+    : kernels_(kernels),
+      inducing_(select(surface, sampleEvenly(surface, kInducingPoints))),
       exponent_(static_cast<float>(-0.5 / (length * length))),
-      variance_(static_cast<float>(amplitude * amplitude)) {
+      variance_(static_cast<float>(amplitude * amplitude)),
+      padded_((inducing_.cols() + kPointBlock - 1) / kPointBlock * kPointBlock),
+      targets_(static_cast<std::size_t>(3 * padded_)) {
   const Eigen::Index count = inducing_.cols();
+  std::fill_n(targets_.data(), 3 * padded_, kFarAway);
+  for (int axis = 0; axis < 3; ++axis) {
+    Eigen::Map<Eigen::RowVectorXf>(targets_.data() + axis * padded_, count) = inducing_.row(axis);
+  }
   Eigen::MatrixXd covariance = covariances(inducing_).cast<double>();
   covariance.diagonal().array() += kJitter;
   const Eigen::LLT<Eigen::MatrixXd> factor(covariance);
@@ -43,19 +51,59 @@ Eigen::MatrixXf DisplacementPrior::covariances(const Points& points) const {
   return (exponent_ * distances.array()).exp();
 }
 
+/// `weights`: outputs x inducing points.
+DenseLayer DisplacementPrior::layerOf(const Eigen::MatrixXf& weights) const {
+  Layer layer{Eigen::MatrixXf::Zero(weights.rows(), padded_),
+              Eigen::VectorXf::Zero(weights.rows())};
+  layer.weight.leftCols(weights.cols()) = weights;
+  return {kernels_, layer, Activation::kNone};
+}
+
+/// The layer's outputs for the covariances of points with inducing points, block by block: calls
+/// use(first point, outputs x count).
+template <class Use>
+void DisplacementPrior::multiply(const DenseLayer& layer, const Points& points, ThreadTeam& team,
+                                 const Use& use) const {
+  const auto outputs = static_cast<long>(layer.paddedOutputs());
+  std::vector<AlignedFloats> covariances, products;
+  for (int thread = 0; thread < team.size(); ++thread) {
+    covariances.emplace_back(static_cast<std::size_t>(kBlock * padded_));
+    products.emplace_back(static_cast<std::size_t>(kBlock * outputs));
+  }
+  const float* const targets[] = {targets_.data(), targets_.data() + padded_,
+                                  targets_.data() + 2 * padded_};
+  team.forEach((points.cols() + kBlock - 1) / kBlock, [&](int thread, long block) {
+    const Eigen::Index first = block * kBlock, count = std::min(kBlock, points.cols() - first);
+    float* covariance = covariances[static_cast<std::size_t>(thread)].data();
+    float* product = products[static_cast<std::size_t>(thread)].data();
+    kernels_.gaussians(points.data() + 3 * first, count, targets, padded_, exponent_, covariance);
+    kernels_.dense(layer.view(), {covariance, padded_, count}, 0, layer.view().panel_count, product,
+                   outputs);
+    use(first, Eigen::Map<const Eigen::MatrixXf>(product, outputs, count));
+  });
+}
+
 Eigen::MatrixXf DisplacementPrior::functions(const Points& points) const {
-  return weights_.transpose() * covariances(points);
+  ThreadTeam alone(1);
+  return functions(points, alone);
+}
+
+Eigen::MatrixXf DisplacementPrior::functions(const Points& points, ThreadTeam& team) const {
+  Eigen::MatrixXf functions(rank(), points.cols());
+  multiply(layerOf(weights_.transpose()), points, team, [&](Eigen::Index first, const auto& rows) {
+    functions.middleCols(first, rows.cols()) = rows.topRows(rank());
+  });
+  return functions;
 }
 
 Points DisplacementPrior::displacements(const Points& points,
                                         const Eigen::Matrix3Xf& coefficients) const {
-  const Eigen::Matrix3Xf weights = coefficients * weights_.transpose();
+  ThreadTeam alone(1);
   Points displacements(3, points.cols());
-  for (Eigen::Index begin = 0; begin < points.cols(); begin += kBlock) {
-    const Eigen::Index count = std::min(kBlock, points.cols() - begin);
-    displacements.middleCols(begin, count).noalias() =
-        weights * covariances(points.middleCols(begin, count));
-  }
+  multiply(layerOf(coefficients * weights_.transpose()), points, alone,
+           [&](Eigen::Index first, const auto& rows) {
+             displacements.middleCols(first, rows.cols()) = rows.template topRows<3>();
+           });
   return displacements;
 }
 

@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <vector>
 
+#include "network/dense_layer.hpp"
 #include "unirit/point_cloud.hpp"
 
 namespace unirit {
@@ -17,7 +18,8 @@ class DisplacementPrior {
  public:
   /// `surface`: 3 x N points, of which at most 128 serve as inducing points. The rank is at most
   /// `rank`, less where the surface has fewer points.
-  DisplacementPrior(const Points& surface, double length, double amplitude, int rank);
+  DisplacementPrior(const Points& surface, double length, double amplitude, int rank,
+                    const Kernels& kernels = selectKernels());
 
   Eigen::Index rank() const { return weights_.cols(); }
 
@@ -26,6 +28,7 @@ class DisplacementPrior {
 
   /// Value of each function at each point, rank x Q.
   Eigen::MatrixXf functions(const Points& points) const;
+  Eigen::MatrixXf functions(const Points& points, ThreadTeam& team) const;
 
   /// Displacements at the points, 3 x Q, for coefficients 3 x rank.
   Points displacements(const Points& points, const Eigen::Matrix3Xf& coefficients) const;
@@ -36,11 +39,18 @@ class DisplacementPrior {
 
  private:
   Eigen::MatrixXf covariances(const Points& points) const;  // inducing points x Q
+  DenseLayer layerOf(const Eigen::MatrixXf& weights) const;
+  template <class Use>
+  void multiply(const DenseLayer& layer, const Points& points, ThreadTeam& team,
+                const Use& use) const;
 
+  const Kernels& kernels_;
   Points inducing_;
   float exponent_;  // of the squared distance
   float variance_;
   Eigen::MatrixXf weights_;  // inducing points x rank
+  long padded_;              // inducing points, to whole blocks
+  AlignedFloats targets_;    // the same as the kernels read them: rows x, y, z
 };
 
 }  // namespace unirit

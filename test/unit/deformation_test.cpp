@@ -65,6 +65,46 @@ TEST(Deformation, TellsHowTheSurfaceIsStretchedAndTurned) {
   EXPECT_LT(meanDeterminant(-4.0F), 0.0);  // mirrored
 }
 
+/// Moves every point alike, and is half sure of it.
+class Shift : public DisplacementField {
+ public:
+  Points displacements(const Points& preoperative) const override {
+    return Eigen::Vector3f(0.01F, 0.0F, 0.0F).replicate(1, preoperative.cols());
+  }
+  std::vector<Eigen::Matrix3f> gradients(const Points& preoperative) const override {
+    return std::vector<Eigen::Matrix3f>(static_cast<std::size_t>(preoperative.cols()),
+                                        Eigen::Matrix3f::Zero());
+  }
+  Eigen::RowVectorXf confidence(const Points& preoperative) const override {
+    return Eigen::RowVectorXf::Constant(preoperative.cols(), 0.5F);
+  }
+};
+
+TEST(Deformation, TakesWhatTheFieldSaysOfTheSurfaceAndAsksItOfOtherPoints) {
+  const auto field = std::make_shared<const Shift>();
+  const Points surface = test::bumpyEllipsoid(30, 5), others = test::bumpyEllipsoid(7, 6);
+  const Deformation deformation(somePose(), surface, field,
+                                {Points::Constant(3, 30, 0.02F), Eigen::RowVectorXf::Ones(30)});
+  const Points rigid = deformation.moveRigidly(surface);
+  EXPECT_TRUE(deformation.movedSurface().isApprox((rigid.array() + 0.02F).matrix(), 1e-6F));
+  EXPECT_EQ(deformation.confidence(), Eigen::RowVectorXf::Ones(30));
+  const Points shift = deformation.move(others) - deformation.moveRigidly(others);
+  EXPECT_TRUE(shift.isApprox(field->displacements(others), 1e-4F));
+  EXPECT_EQ(deformation.confidence(others), field->confidence(others));
+}
+
+TEST(Deformation, RefusesNoFieldAndValuesOfAnotherNumberOfPoints) {
+  const auto pose = Eigen::Isometry3d::Identity();
+  const Points surface = test::bumpyEllipsoid(30, 5);
+  const Points displacements = Points::Zero(3, 30);
+  EXPECT_THROW(Deformation(pose, surface, nullptr, {displacements, {}}), std::invalid_argument);
+  const auto field = std::make_shared<const Shift>();
+  EXPECT_THROW(Deformation(pose, surface, field, {displacements.leftCols(29), {}}),
+               std::invalid_argument);
+  EXPECT_THROW(Deformation(pose, surface, field, {displacements, Eigen::RowVectorXf::Ones(29)}),
+               std::invalid_argument);
+}
+
 TEST(Deformation, RefusesDisplacementsOfAnotherSizeAndEmptySurfaces) {
   const auto pose = Eigen::Isometry3d::Identity();
   EXPECT_THROW(Deformation(pose, Points(3, 2), Points(3, 3)), std::invalid_argument);

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "instruction_set_test.hpp"
+#include "unirit/point_cloud.hpp"
 #include "unirit/random.hpp"
 
 namespace unirit {
@@ -143,6 +144,26 @@ TEST_P(RefinementKernel, GatheredSumsAreThoseOfDoublePrecision) {
       for (int k = 0; k < 7; ++k) {
         EXPECT_NEAR(static_cast<double>(sums[k]), expected[k], 1e-6 * expected[0]) << "sum " << k;
       }
+    }
+  }
+}
+
+TEST_P(RefinementKernel, GaussiansAreThoseOfDoublePrecision) {
+  Targets targets(kTargets);
+  const Points queries = 0.7F * Points::Random(3, 5);
+  std::vector<float> values(5 * kTargets, -1.0F);
+  selectKernels().gaussians(queries.data(), 4, targets.view().position, kTargets, -3.0F,
+                            values.data());
+  for (long q = 0; q < 5; ++q) {
+    for (long j = 0; j < kTargets; ++j) {
+      double squared_distance = 0.0;
+      for (int axis = 0; axis < 3; ++axis) {
+        squared_distance +=
+            std::pow(targets.position(axis, j) - static_cast<double>(queries(axis, q)), 2);
+      }
+      const double expected = q < 4 ? std::exp(-3.0 * squared_distance) : -1.0;  // one not asked
+      EXPECT_NEAR(static_cast<double>(values[static_cast<std::size_t>(q * kTargets + j)]), expected,
+                  2e-6);
     }
   }
 }

@@ -199,6 +199,28 @@ TEST(CoherentField, MovesAsTheRefinementDid) {
   EXPECT_GT(expected.cwiseAbs().maxCoeff(), 0.001F);
 }
 
+TEST(CoherentField, SaysTheSameWhereTheFunctionsAreKnownOnAnyNumberOfThreads) {
+  const RegistrationPair pair = pairOf("liver", Protocol::kPartial, 1);
+  const Problem problem(pair);
+  const Outcome outcome(problem);
+  const auto& prior = outcome.refinement.prior();
+  const CoherentField field(prior, problem.normalisation, outcome.refined.pose.linear(),
+                            outcome.refined.coefficients, outcome.refined.covariance_factor);
+  const Points organ = problem.normalisation.apply(pair.source);
+  ThreadTeam alone(1);
+  const Eigen::MatrixXf functions = prior->functions(organ);
+  const FieldValues values = field.valuesAt(functions, alone);
+  EXPECT_LT((values.displacements - field.displacements(pair.source)).cwiseAbs().maxCoeff(), 1e-6F);
+  EXPECT_EQ(values.confidence, field.confidence(pair.source));
+  for (const int threads : {2, 3}) {
+    ThreadTeam team(threads);
+    EXPECT_EQ(prior->functions(organ, team), functions);
+    const FieldValues others = field.valuesAt(functions, team);
+    EXPECT_EQ(others.displacements, values.displacements);
+    EXPECT_EQ(others.confidence, values.confidence);
+  }
+}
+
 TEST(CoherentField, IsSurerOfWhatWasSeen) {
   for (const char* organ : kOrgans) {
     const RegistrationPair pair = pairOf(organ, Protocol::kPartial, 1);
