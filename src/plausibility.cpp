@@ -63,7 +63,7 @@ double degreesBetween(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b) {
 PlausibilityCheck jointly(const std::vector<PlausibilityCheck>& checks, double limit) {
   double sum = 0.0;
   for (const PlausibilityCheck& check : checks) sum += closeness(check) * closeness(check);
-  return atMost("closeness to the limits of turn, residual, missing, confidence and surprise",
+  return atMost("joint closeness to the limits",
                 std::sqrt(sum / static_cast<double>(checks.size())), limit);
 }
 

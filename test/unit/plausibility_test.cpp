@@ -223,7 +223,7 @@ TEST(CheckOutput, RefusesWhatIsCloseToAllLimitsAtOnce) {
   registration.refinement->missing = 0.1;
   registration.refinement->confidence = 0.4;
   registration.residual.p95 = 0.022;
-  EXPECT_EQ(refusalOf(registration).rfind("refused: closeness to the limits of turn", 0), 0U);
+  EXPECT_EQ(refusalOf(registration).rfind("refused: joint closeness to the limits", 0), 0U);
 }
 
 TEST(Closeness, IsAboveOneWhereACheckFails) {
