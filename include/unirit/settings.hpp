@@ -128,31 +128,14 @@ void visitSettings(Settings& settings, Visitor&& visitor) {
           "extent of the cloud over the organ's, at least");
   visitor("plausibility/max_extent_ratio", p.max_extent_ratio, 1.0, 100.0,
           "extent of the cloud over the organ's, at most");
+  visitor("plausibility/min_overlap", p.min_overlap, 0.0, 1.0,
+          "share of the cloud within a tenth of the extent of where the start has the organ");
   visitor("plausibility/inlier_tolerance", p.inlier_tolerance, 0.0, 0.1,
           "cloud points nearer to the moved surface than this are inliers [m]");
   visitor("plausibility/max_residual", p.max_residual, 0.0, 1.0,
           "median distance of the cloud to the moved surface over the organ's extent, at most");
   visitor("plausibility/max_residual_p95", p.max_residual_p95, 0.0, 1.0,
           "95th percentile of the same, at most");
-  visitor("plausibility/max_surprise", p.max_surprise, 0.0, 10.0,
-          "length of the refined displacement over the length expected, at most");
-  visitor("plausibility/max_displacement", p.max_displacement, 0.0, 2.0,
-          "largest non-rigid displacement over the organ's extent, at most");
-  visitor("plausibility/max_jump_translation", p.max_jump_translation, 0.0, 10.0,
-          "translation from the last accepted pose at the organ's centroid, at most [m]");
-  visitor("plausibility/max_jump_rotation", p.max_jump_rotation, 0.0, 180.0,
-          "rotation from the last accepted pose, at most [degree]");
-}
-
-/// Throws std::invalid_argument naming the first setting outside its range, its value and the
-  visitor("plausibility/min_overlap", p.min_overlap, 0.0, 1.0,
-          "share of the cloud within a tenth of the extent of where the start has the organ");
-/// range.
-void validate(const RegistrationSettings& settings);
-
-/// Settings as a flat JSON object of the names above (plus stages, pairing); what result files
-/// carry.
-std::string toJson(const RegistrationSettings& settings);
   visitor("plausibility/min_inliers", p.min_inliers, 0.0, 1.0, "share of inliers, at least");
   visitor("plausibility/max_residual_left", p.max_residual_left, 0.0, 10.0,
           "residual over that of the rigid part alone, at most");
@@ -160,10 +143,10 @@ std::string toJson(const RegistrationSettings& settings);
           "share of the organ's side in view without a cloud point nearby, at most");
   visitor("plausibility/min_confidence", p.min_confidence, 0.0, 1.0,
           "mean confidence over the organ, at least");
-
-/// SHA-256 (hex) of toJson.
-std::string sha256(const RegistrationSettings& settings);
-
+  visitor("plausibility/max_surprise", p.max_surprise, 0.0, 10.0,
+          "length of the refined displacement over the length expected, at most");
+  visitor("plausibility/max_displacement", p.max_displacement, 0.0, 2.0,
+          "largest non-rigid displacement over the organ's extent, at most");
   visitor("plausibility/max_stretch", p.max_stretch, 1.0, 100.0,
           "largest principal stretch, 95th percentile over the organ, at most");
   visitor("plausibility/min_compression", p.min_compression, 0.0, 1.0,
@@ -174,4 +157,21 @@ std::string sha256(const RegistrationSettings& settings);
           "rotation from the start, at most [degree]");
   visitor("plausibility/max_joint", p.max_joint, 0.0, 10.0,
           "root mean square of turn, residual, missing, confidence and surprise over their limits");
+  visitor("plausibility/max_jump_translation", p.max_jump_translation, 0.0, 10.0,
+          "translation from the last accepted pose at the organ's centroid, at most [m]");
+  visitor("plausibility/max_jump_rotation", p.max_jump_rotation, 0.0, 180.0,
+          "rotation from the last accepted pose, at most [degree]");
+}
+
+/// Throws std::invalid_argument naming the first setting outside its range, its value and the
+/// range.
+void validate(const RegistrationSettings& settings);
+
+/// Settings as a flat JSON object of the names above (plus stages, pairing); what result files
+/// carry.
+std::string toJson(const RegistrationSettings& settings);
+
+/// SHA-256 (hex) of toJson.
+std::string sha256(const RegistrationSettings& settings);
+
 }  // namespace unirit

@@ -186,24 +186,24 @@ PlausibilitySettings fromConfig(const UniritConfig& config) {
   settings.max_organ_extent = config.max_organ_extent;
   settings.min_extent_ratio = config.min_extent_ratio;
   settings.max_extent_ratio = config.max_extent_ratio;
+  settings.min_overlap = config.min_overlap;
   settings.inlier_tolerance = config.inlier_tolerance;
   settings.max_residual = config.max_residual;
   settings.max_residual_p95 = config.max_residual_p95;
+  settings.min_inliers = config.min_inliers;
+  settings.max_residual_left = config.max_residual_left;
+  settings.max_missing = config.max_missing;
+  settings.min_confidence = config.min_confidence;
   settings.max_surprise = config.max_surprise;
   settings.max_displacement = config.max_displacement;
+  settings.max_stretch = config.max_stretch;
+  settings.min_compression = config.min_compression;
+  settings.max_folded = config.max_folded;
+  settings.max_turn = config.max_turn;
+  settings.max_joint = config.max_joint;
   settings.max_jump_translation = config.max_jump_translation;
   settings.max_jump_rotation = config.max_jump_rotation;
   return settings;
 }
 
 }  // namespace unirit
-  settings.min_overlap = config.min_overlap;
-  settings.min_inliers = config.min_inliers;
-  settings.max_residual_left = config.max_residual_left;
-  settings.max_missing = config.max_missing;
-  settings.min_confidence = config.min_confidence;
-  settings.max_stretch = config.max_stretch;
-  settings.min_compression = config.min_compression;
-  settings.max_folded = config.max_folded;
-  settings.max_turn = config.max_turn;
-  settings.max_joint = config.max_joint;
