@@ -1,30 +1,31 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSD-3-Clause
-"""Tells what the plausibility checks refused: plot_refusals.py FOLDER [--plots DIR] [--limits]
+"""Tells what the plausibility checks refused: plot_refusals.py FOLDER [--plots DIR] [--set-limits]
 
 FOLDER is the --output of unirit_refusals. Prints a Markdown table of what was refused and what was
 let through, with 95 % confidence intervals (Wilson 1927), and which check refused first. --plots
 draws refusals.png and refusals.svg, what is let through against what is refused falsely as all
-limits are scaled together, into DIR. --limits prints limits for config/unirit.yaml that fit these
-registrations: only ever do that with training organs. Needs numpy and matplotlib
-(python3-matplotlib).
+limits are scaled together, into DIR. --set-limits draws new limits from these registrations, prints
+them and writes them into the source tree that this script lies in (or --tree): only ever do that
+with training organs. Needs numpy and matplotlib (python3-matplotlib).
 """
 import argparse
 import csv
 import os
+import re
 import sys
 
 import numpy as np
 
-FALSE_REFUSALS = 0.015  # aimed at with --limits
+FALSE_REFUSALS = 0.015  # aimed at with --set-limits
 QUANTILE = 0.998        # of right registrations that keep to one limit of the joint check
 ROOM = 1.25             # of the other limits beyond the farthest right registration
 FIRST_KIND = ("other organ", "table top", "wrong unit")
 SECOND_KIND = ("far start", "small view", "half other")
 
+TURN = "turn from the start [degree]"  # its limit is how far the start may be off, by design
 # Setting of each check whose limit is drawn from registrations
 SETTINGS = {
-    "turn from the start [degree]": "max_turn",
     "95th percentile of the surface residual over extent": "max_residual_p95",
     "share in view that is missing": "max_missing",
     "mean confidence": "min_confidence",
@@ -38,7 +39,7 @@ SETTINGS = {
     "residual over that of the rigid part": "max_residual_left",
     "overlap of the cloud with the predicted region": "min_overlap",
 }
-JOINT = list(SETTINGS)[:5]  # what the joint check is made of
+JOINT = [TURN] + list(SETTINGS)[:4]  # what the joint check is made of
 JOINT_NAME = "joint closeness to the limits"
 
 
@@ -172,7 +173,8 @@ def round_up(value, at_least):
     return float(np.floor(value / unit) * unit if at_least else np.ceil(value / unit) * unit)
 
 
-def print_limits(data):
+def draw_limits(data):
+    """New limits by the names of their settings."""
     right = (data.kind == "ordinary") & data.right & ~np.isnan(data.values[:, -1])
     for i, name in enumerate(data.checks):
         if name not in SETTINGS:
@@ -190,9 +192,34 @@ def print_limits(data):
     kept = np.delete(closeness, joint, axis=1).max(axis=1) <= 1.0
     drop = max(0, int(FALSE_REFUSALS * right.sum()) - (~kept).sum())
     data.limits[joint] = round_up(np.sort(together[kept])[-1 - drop], False)
-    print("plausibility:")
-    for name, setting in {**SETTINGS, JOINT_NAME: "max_joint"}.items():
-        print(f"  {setting}: {data.limits[data.checks.index(name)]:g}")
+    return {setting: f"{data.limits[data.checks.index(name)]:g}"
+            for name, setting in {**SETTINGS, JOINT_NAME: "max_joint"}.items()}
+
+
+def write_limits(limits, tree):
+    """Into the four places where defaults stand; comments behind them stay in their column."""
+    number = r"([0-9.e+-]+)"
+    places = {
+        "include/unirit/settings.hpp": rf"(  double {{}} = ){number}(;)( *)",
+        "config/unirit.yaml": rf"(\n  {{}}: ){number}()( *)",
+        "README.md": rf"(\| `plausibility/{{}}` \| ){number}( \|)()",
+        "cfg/Unirit.cfg": rf'(gen\.add\("{{}}",(?:(?!gen\.add).)*?,\s+){number}'
+                          r"(, [0-9.]+, [0-9.]+\))()",
+    }
+    for path, pattern in places.items():
+        path = os.path.join(tree, path)
+        with open(path, encoding="utf-8") as file:
+            text = file.read()
+        for setting, limit in limits.items():
+            def replaced(match):
+                head, old, tail, gap = match.groups()
+                gap = " " * max(2, len(gap) + len(old) - len(limit)) if gap else ""
+                return head + limit + tail + gap
+            text, count = re.subn(pattern.format(setting), replaced, text, flags=re.DOTALL)
+            if count != 1:
+                sys.exit(f"plot_refusals.py: {path} has {count} defaults of {setting}, not one")
+        with open(path, "w", encoding="utf-8") as file:
+            file.write(text)
 
 
 def main():
@@ -200,7 +227,9 @@ def main():
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder")
     parser.add_argument("--plots", metavar="DIR")
-    parser.add_argument("--limits", action="store_true")
+    parser.add_argument("--set-limits", action="store_true")
+    parser.add_argument("--tree", metavar="DIR",
+                        default=os.path.join(os.path.dirname(os.path.abspath(__file__)), ".."))
     arguments = parser.parse_args()
     try:
         data = Registrations(arguments.folder)
@@ -209,9 +238,12 @@ def main():
     print_table(data)
     if arguments.plots:
         plot(data, arguments.plots)
-    if arguments.limits:
-        print()
-        print_limits(data)
+    if arguments.set_limits:
+        limits = draw_limits(data)
+        print("\nplausibility:")
+        for setting, limit in limits.items():
+            print(f"  {setting}: {limit}")
+        write_limits(limits, arguments.tree)
 
 
 if __name__ == "__main__":

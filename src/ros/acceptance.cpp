@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "acceptance.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <sstream>
 #include <utility>
@@ -21,6 +22,12 @@ void log(const RegistrationResult& result) {
     ROS_WARN_THROTTLE(kLogPeriod, "registration %u %s: %s", result.id, status,
                       result.message.c_str());
   }
+}
+
+/// Of its input or of what came out; messages that are no clouds at all fail before any check.
+bool failedACheck(const RegistrationResult& result) {
+  return std::any_of(result.checks.begin(), result.checks.end(),
+                     [](const Check& check) { return check.passed == 0; });
 }
 
 }  // namespace
@@ -64,7 +71,7 @@ bool Acceptance::publish(std::shared_ptr<const Attempt> attempt,
     deformed_.publish(attempt->deformed);
     rigid_.publish(attempt->rigid);
     sendTransform(result.header.stamp);
-  } else if (result.status == RegistrationResult::REFUSED) {
+  } else if (failedACheck(result)) {
     refused_.publish(intraoperative);
   }
   result_.publish(result);

@@ -84,6 +84,19 @@ TEST_P(BadInput, isRefusedWithASentenceAndLeavesTheLastGoodRegistration) {
 INSTANTIATE_TEST_SUITE_P(Clouds, BadInput, testing::ValuesIn(badClouds()),
                          [](const auto& tested) { return tested.param.name; });
 
+TEST_F(Node, cloudThatFailsACheckIsShownWithValueAndLimit) {
+  client().sendCloud(seenThen([](Points& p) { p *= 1000.0F; }));
+  const auto response = client().registerUntil(
+      [](const auto& result) { return result.status == RegistrationResult::INVALID_INPUT; });
+  ASSERT_FALSE(response.result.checks.empty());
+  const auto& last = response.result.checks.back();
+  EXPECT_EQ(last.name, "largest extent of a cloud over the organ's");
+  EXPECT_GT(last.value, last.limit);
+  EXPECT_FALSE(last.passed);
+  EXPECT_TRUE(client().waitUntil(
+      [&] { return client().refused.header.stamp == response.result.header.stamp; }));
+}
+
 TEST_F(Node, otherLayoutsRegisterAsThePlainOneDoes) {
   const auto plain = client().callRegister(requestWith(organCloud(), seenCloud(truePose(), {})));
   const Eigen::MatrixXd points = pointsOf(seenCloud(truePose(), {})).cast<double>();

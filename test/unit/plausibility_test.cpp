@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <sstream>
 
 #include "shapes.hpp"
 #include "unirit/registration.hpp"
@@ -71,6 +72,21 @@ std::string refusalOf(Registration registration) {
               registration);
   EXPECT_EQ(registration.checks.size(), registration.refinement ? 15U : 10U);
   return registration.succeeded() ? "" : registration.message;
+}
+
+std::string refusal(const std::string& check, double value, const std::string& words,
+                    double limit) {
+  std::ostringstream sentence;
+  sentence << "refused: " << check << " is " << value << words << limit;
+  return sentence.str();
+}
+
+std::string above(const std::string& check, double value, double limit) {
+  return refusal(check, value, ", the limit is ", limit);
+}
+
+std::string below(const std::string& check, double value, double limit) {
+  return refusal(check, value, ", at least ", limit) + " is asked for";
 }
 
 TEST(FindFault, AcceptsAnOrgan) { EXPECT_EQ(faultOf(test::bumpyEllipsoid(200, 1)), ""); }
@@ -159,19 +175,18 @@ TEST(CheckOutput, RefusesRotationsThatAreNone) {
   EXPECT_NE(refusalOf(registration).find("rotation error"), std::string::npos);
 }
 
-TEST(CheckOutput, RefusesLargeResidualsNamingValueAndLimit) {
+TEST(CheckOutput, RefusesLargeResiduals) {
   Registration registration = plausible();
   registration.residual.median = 0.02;
   EXPECT_EQ(refusalOf(registration),
-            "refused: median surface residual over extent is 0.1, the limit is 0.06");
+            above("median surface residual over extent", 0.1, kDefaults.max_residual));
   registration = plausible();
-  registration.residual.p95 = 0.03;
-  EXPECT_EQ(refusalOf(registration),
-            "refused: 95th percentile of the surface residual over extent is 0.15, the limit is "
-            "0.125");
+  registration.residual.p95 = 0.05;
+  EXPECT_EQ(refusalOf(registration), above("95th percentile of the surface residual over extent",
+                                           0.25, kDefaults.max_residual_p95));
   registration = plausible();
-  registration.residual.inlier_fraction = 0.1;
-  EXPECT_EQ(refusalOf(registration), "refused: share of inliers is 0.1, at least 0.2 is asked for");
+  registration.residual.inlier_fraction = 0.05;
+  EXPECT_EQ(refusalOf(registration), below("share of inliers", 0.05, kDefaults.min_inliers));
 }
 
 TEST(CheckOutput, RefusesFarTurnsFromTheStart) {
@@ -179,50 +194,50 @@ TEST(CheckOutput, RefusesFarTurnsFromTheStart) {
   registration.T_intraoperative_preoperative.rotate(
       Eigen::AngleAxisd(M_PI / 2.0, Eigen::Vector3d::UnitY()));
   EXPECT_EQ(refusalOf(registration),
-            "refused: turn from the start [degree] is 90, the limit is 60");
+            above("turn from the start [degree]", 90.0, kDefaults.max_turn));
 }
 
 TEST(CheckOutput, RefusesImplausibleDeformations) {
   Registration registration = plausible();
   registration.displacement.max = 0.1;
   EXPECT_EQ(refusalOf(registration),
-            "refused: largest displacement over extent is 0.5, the limit is 0.25");
+            above("largest displacement over extent", 0.5, kDefaults.max_displacement));
   registration = plausible();
-  registration.displacement.stretch = 3.0;
-  EXPECT_EQ(refusalOf(registration), "refused: stretch is 3, the limit is 2");
+  registration.displacement.stretch = 5.0;
+  EXPECT_EQ(refusalOf(registration), above("stretch", 5.0, kDefaults.max_stretch));
   registration = plausible();
-  registration.displacement.compression = 0.05;
-  EXPECT_EQ(refusalOf(registration), "refused: compression is 0.05, at least 0.1 is asked for");
+  registration.displacement.compression = 0.01;
+  EXPECT_EQ(refusalOf(registration), below("compression", 0.01, kDefaults.min_compression));
   registration = plausible();
-  registration.displacement.folded_fraction = 0.1;
-  EXPECT_EQ(refusalOf(registration), "refused: share folded over is 0.1, the limit is 0.02");
+  registration.displacement.folded_fraction = 0.2;
+  EXPECT_EQ(refusalOf(registration), above("share folded over", 0.2, kDefaults.max_folded));
 }
 
 TEST(CheckOutput, RefusesWhatTheRefinementShouldNotHaveFound) {
   Registration registration = plausiblyRefined();
-  registration.refinement->residual_left = 1.2;
+  registration.refinement->residual_left = 2.5;
   EXPECT_EQ(refusalOf(registration),
-            "refused: residual over that of the rigid part is 1.2, the limit is 1.1");
+            above("residual over that of the rigid part", 2.5, kDefaults.max_residual_left));
   registration = plausiblyRefined();
-  registration.refinement->missing = 0.5;
+  registration.refinement->missing = 0.75;
   EXPECT_EQ(refusalOf(registration),
-            "refused: share in view that is missing is 0.5, the limit is 0.12");
+            above("share in view that is missing", 0.75, kDefaults.max_missing));
   registration = plausiblyRefined();
-  registration.refinement->confidence = 0.2;
-  EXPECT_EQ(refusalOf(registration), "refused: mean confidence is 0.2, at least 0.38 is asked for");
+  registration.refinement->confidence = 0.125;
+  EXPECT_EQ(refusalOf(registration), below("mean confidence", 0.125, kDefaults.min_confidence));
   registration = plausiblyRefined();
-  registration.refinement->surprise = 1.5;
+  registration.refinement->surprise = 2.5;
   EXPECT_EQ(refusalOf(registration),
-            "refused: surprise of the displacement is 1.5, the limit is 1.3");
+            above("surprise of the displacement", 2.5, kDefaults.max_surprise));
 }
 
 TEST(CheckOutput, RefusesWhatIsCloseToAllLimitsAtOnce) {
   Registration registration = plausiblyRefined();
-  registration.refinement->surprise = 1.25;
+  registration.refinement->surprise = 0.95 * kDefaults.max_surprise;
   EXPECT_EQ(refusalOf(registration), "");  // close to one
-  registration.refinement->missing = 0.1;
-  registration.refinement->confidence = 0.4;
-  registration.residual.p95 = 0.022;
+  registration.refinement->missing = 0.95 * kDefaults.max_missing;
+  registration.refinement->confidence = 1.05 * kDefaults.min_confidence;
+  registration.residual.p95 = 0.95 * 0.2 * kDefaults.max_residual_p95;
   EXPECT_EQ(refusalOf(registration).rfind("refused: joint closeness to the limits", 0), 0U);
 }
 

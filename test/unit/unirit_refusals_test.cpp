@@ -131,20 +131,38 @@ TEST_F(RefusalsTool, RefusesFaultyRequestsInASentence) {
 }
 
 TEST_F(RefusalsTool, ItsFilesAreWhatTheScriptReads) {
-  const std::string script = UNIRIT_PYTHON " " UNIRIT_SCRIPTS "/plot_refusals.py ";
+  const std::string script = UNIRIT_PYTHON " " UNIRIT_SOURCE_DIR "/scripts/plot_refusals.py ";
   if (shell(UNIRIT_PYTHON " -c 'import numpy, matplotlib'") != 0) {
     GTEST_SKIP() << "numpy and matplotlib are not installed";
   }
   ASSERT_EQ(run(std::string(kSmall) + "--output out"), 0) << text("stderr");
-  ASSERT_EQ(shell(script + "out --plots plots --limits"), 0) << text("stderr");
-  for (const char* words : {"| all ordinary |", "| wrong unit | ", " 0.0 % (0.0 to ",
-                            "| all failures |", "max_joint: "}) {
+  ASSERT_EQ(shell(script + "out --plots plots"), 0) << text("stderr");
+  for (const char* words :
+       {"| all ordinary |", "| wrong unit | ", " 0.0 % (0.0 to ", "| all failures |"}) {
     EXPECT_NE(text("stdout").find(words), std::string::npos) << words;
   }
   EXPECT_TRUE(fs::exists(folder_ / "plots/refusals.png"));
   EXPECT_TRUE(fs::exists(folder_ / "plots/refusals.svg"));
   EXPECT_EQ(shell(script + "nowhere"), 1);
   EXPECT_NE(text("stderr").find("nowhere is no output of unirit_refusals"), std::string::npos);
+
+  // New limits go to the four places where defaults stand
+  const std::vector<std::string> places{"include/unirit/settings.hpp", "config/unirit.yaml",
+                                        "cfg/Unirit.cfg", "README.md"};
+  for (const std::string& place : places) {
+    fs::create_directories((folder_ / "tree" / place).parent_path());
+    fs::copy(fs::path(UNIRIT_SOURCE_DIR) / place, folder_ / "tree" / place);
+  }
+  ASSERT_EQ(shell(script + "out --set-limits --tree tree"), 0) << text("stderr");
+  const std::string printed = text("stdout");
+  const std::size_t found = printed.find("  max_surprise: ");
+  ASSERT_NE(found, std::string::npos);
+  const std::string line = printed.substr(found, printed.find('\n', found) - found);
+  EXPECT_NE(text("tree/config/unirit.yaml").find(line + " "), std::string::npos) << line;
+  const std::string limit = line.substr(line.find(':') + 2);
+  EXPECT_NE(text("tree/" + places[0]).find("max_surprise = " + limit + ";"), std::string::npos);
+  EXPECT_NE(text("tree/" + places[2]).find(", " + limit + ", 0.0, 10.0)"), std::string::npos);
+  EXPECT_NE(text("tree/" + places[3]).find("max_surprise` | " + limit + " |"), std::string::npos);
 }
 
 }  // namespace
