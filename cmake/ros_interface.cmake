@@ -14,7 +14,7 @@ generate_dynamic_reconfigure_options(cfg/Unirit.cfg)
 #catkin_lint: ignore_once unsorted_list
 catkin_package(
   INCLUDE_DIRS include
-  LIBRARIES unirit_core unirit_io unirit_simulation unirit_ros
+  LIBRARIES unirit_core unirit_io unirit_preprocessing unirit_simulation unirit_ros
   CATKIN_DEPENDS message_runtime ${UNIRIT_CATKIN_DEPENDS}
   DEPENDS EIGEN3)
 

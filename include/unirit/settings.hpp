@@ -22,6 +22,13 @@ enum class Correspondence {
   kPoints,   ///< one of the pre-operative points, moved: tracked vertices, fiducials
 };
 
+/// How the intra-operative cloud is made ready. Lengths scale with the organ.
+struct PreprocessingSettings {
+  double margin = 0.0;  ///< kept around where the organ is expected, over its extent; 0: off
+  double voxel = 0.01;  ///< edge of the voxels that keep one point each, over the same; 0: off
+  double min_density = 0.07;  ///< points in and around a voxel over the median voxel's; 0: off
+};
+
 /// How the clouds are brought to the network.
 struct SamplingSettings {
   int points = 1024;  ///< points kept of each cloud; smaller clouds are taken whole
@@ -75,6 +82,7 @@ struct PlausibilitySettings {
 /// Everything the core can be told.
 struct RegistrationSettings {
   std::vector<Stage> stages{Stage::kRigid, Stage::kNonRigid, Stage::kRefine};
+  PreprocessingSettings preprocessing;  ///< heeded by preprocess, not by the Registrar
   SamplingSettings sampling;
   NetworkSettings network;
   RefinementSettings refinement;
@@ -108,6 +116,13 @@ template <class Settings, class Visitor>
 void visitSettings(Settings& settings, Visitor&& visitor) {
   auto& p = settings.plausibility;
   visitor("threads", settings.threads, 1, 64, "worker threads of the network");
+  auto& c = settings.preprocessing;
+  visitor("preprocessing/margin", c.margin, 0.0, 10.0,
+          "kept around where the organ is expected, over its extent; 0: off");
+  visitor("preprocessing/voxel", c.voxel, 0.0, 0.1,
+          "edge of the voxels that keep one point each, over the organ's extent; 0: off");
+  visitor("preprocessing/min_density", c.min_density, 0.0, 1.0,
+          "points in and around a voxel over the median voxel's, at least; 0: off");
   visitor("sampling/points", settings.sampling.points, 64, 16384, "points kept of each cloud");
   visitor("network/rigid_iterations", settings.network.rigid_iterations, 1, 32,
           "iterations of the rigid module");

@@ -35,6 +35,12 @@ std::string toJson(const Registration& registration, const ResultOrigin& origin)
   json["message"] = registration.message;
   json["preoperative_frame"] = origin.preoperative_frame;
   json["start"] = origin.start;
+  json["preprocessing_stages"] = Json::array();
+  json["preprocessing_points"] = Json::array();
+  for (const StagePoints& stage : origin.preprocessing) {
+    json["preprocessing_stages"].push_back(stage.stage);
+    json["preprocessing_points"].push_back(stage.points);
+  }
   json["transform"] = toJson(registration.T_intraoperative_preoperative);
   json["residual_rms"] = registration.residual.rms;
   json["residual_median"] = registration.residual.median;

@@ -12,10 +12,11 @@ namespace {
 
 /// What config/unirit.yaml tells the node, not the registration.
 bool belongsToNode(const std::string& key) {
-  static const std::set<std::string> keys{"auto_register",     "every_cloud",  "fixed_frame",
-                                          "initial_alignment", "initial_pose", "invert_tf",
-                                          "publish_tf",        "sensor_frame", "stale_after",
-                                          "tf_rate",           "tf_timeout",   "weights"};
+  static const std::set<std::string> keys{
+      "auto_register", "every_cloud",  "fixed_frame",          "initial_alignment",
+      "initial_pose",  "invert_tf",    "preprocessing/region", "preprocessing/region_frame",
+      "publish_tf",    "sensor_frame", "stale_after",          "tf_rate",
+      "tf_timeout",    "weights"};
   return keys.count(key) > 0;
 }
 

@@ -15,7 +15,12 @@ namespace {
 
 using XmlRpc::XmlRpcValue;
 
-constexpr int kPoseNumbers = 7;  // x y z qx qy qz qw
+struct List {
+  std::size_t length;
+  const char* what;
+};
+constexpr List kPose{7, "the 7 numbers x y z qx qy qz qw"};
+constexpr List kBox{6, "the 6 numbers x y z x y z of two corners"};
 
 template <class Value>
 constexpr XmlRpcValue::Type typeOf() {
@@ -84,15 +89,8 @@ class Reader {
   }
 
   void readPose(const std::string& name, std::optional<Eigen::Isometry3d>& pose) {
-    known_.insert(name);
-    std::vector<double> numbers;
-    if (!nh_.hasParam(name)) return;
-    const bool is_list = nh_.getParam(name, numbers);
-    if (is_list && numbers.empty()) return;
-    if (!is_list || numbers.size() != kPoseNumbers) {
-      fault(name, "is not a list of the 7 numbers x y z qx qy qz qw");
-      return;
-    }
+    const std::vector<double> numbers = readList(name, kPose);
+    if (numbers.empty()) return;
     geometry_msgs::Pose message;
     message.position.x = numbers[0];
     message.position.y = numbers[1];
@@ -105,6 +103,17 @@ class Reader {
       pose = fromMessage(message, "it");
     } catch (const Refusal& refusal) {
       fault(name, std::string("cannot be used: ") + refusal.what());
+    }
+  }
+
+  void readBox(const std::string& name, std::optional<Eigen::AlignedBox3d>& box) {
+    const std::vector<double> numbers = readList(name, kBox);
+    if (numbers.empty()) return;
+    const Eigen::Map<const Eigen::Vector3d> a(numbers.data()), b(numbers.data() + 3);
+    if (a.allFinite() && b.allFinite()) {
+      box.emplace(a.cwiseMin(b), a.cwiseMax(b));
+    } else {
+      fault(name, "is not finite");
     }
   }
 
@@ -126,6 +135,17 @@ class Reader {
   }
 
  private:
+  /// Empty where the list is absent, empty or not as it should be.
+  std::vector<double> readList(const std::string& name, const List& list) {
+    known_.insert(name);
+    std::vector<double> numbers;
+    if (!nh_.hasParam(name)) return {};
+    const bool is_list = nh_.getParam(name, numbers);
+    if (is_list && (numbers.empty() || numbers.size() == list.length)) return numbers;
+    fault(name, std::string("is not a list of ") + list.what);
+    return {};
+  }
+
   std::string sentence(const std::string& name, const std::string& what) const {
     return "parameter " + nh_.resolveName(name) + " " + what;
   }
@@ -151,6 +171,8 @@ void readNodeSettings(Reader& reader, NodeSettings& node) {
     }
     node.initial_alignment = word;
   });
+  reader.readBox("preprocessing/region", node.region);
+  reader.read("preprocessing/region_frame", node.region_frame);
   reader.read("fixed_frame", node.fixed_frame);
   reader.read("sensor_frame", node.sensor_frame);
   reader.read("publish_tf", node.publish_tf);

@@ -21,6 +21,8 @@ struct NodeSettings {
   double stale_after = 10.0;   ///< age at which an accepted registration is withdrawn [s]
   std::optional<Eigen::Isometry3d> initial_pose;  ///< T_fixed_preoperative
   std::string initial_alignment = "centroid";     ///< centroid or none
+  std::optional<Eigen::AlignedBox3d> region;      ///< crops the cloud; nothing: everything [m]
+  std::string region_frame;                       ///< of the region; empty: the cloud's own
   std::string fixed_frame;   ///< does not move with the camera; empty: the camera stands still
   std::string sensor_frame;  ///< of the camera; empty: the cloud's own frame; none: there is none
   bool publish_tf = true;

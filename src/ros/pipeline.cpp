@@ -40,6 +40,12 @@ void requireRecent(ros::Time stamp, ros::Time now, double limit) {
   throw Refusal(Status::kInvalidInput, sentence.str());
 }
 
+double millisecondsSince(std::chrono::steady_clock::time_point start) {
+  const std::chrono::duration<double, std::milli> elapsed =
+      std::chrono::steady_clock::now() - start;
+  return elapsed.count();
+}
+
 }  // namespace
 
 Pipeline::Pipeline(const Parameters& parameters, TfBridge& bridge)
@@ -134,11 +140,10 @@ void Pipeline::attempt(const Job& job, const Attempt* accepted, ros::Time now, A
   const std_msgs::Header& header = job.intraoperative->header;
 
   // Messages to clouds
-  const auto started = std::chrono::steady_clock::now();
+  auto started = std::chrono::steady_clock::now();
   const ReceivedCloud organ = fromMessage(*job.preoperative, names::kPreoperativeCloud);
   ReceivedCloud seen = fromMessage(*job.intraoperative, names::kIntraoperativeCloud);
-  const std::chrono::duration<double, std::milli> conversion =
-      std::chrono::steady_clock::now() - started;
+  const double conversion = millisecondsSince(started);
 
   // Where to start
   attempt.fixed_frame = settings_.fixed_frame.empty() ? header.frame_id : settings_.fixed_frame;
@@ -149,13 +154,16 @@ void Pipeline::attempt(const Job& job, const Attempt* accepted, ros::Time now, A
   const Start start = chooseStart(job, guess, accepted, T_cloud_fixed);
   attempt.result.start = start.name;
 
-  // Registration; a cloud that is at fault does not use up the guess
-  Registration registration = registrar_->registerClouds(
-      organ.cloud, seen.cloud,
-      start.T_cloud_preoperative ? *start.T_cloud_preoperative
-                                 : alignCentroids(organ.cloud, seen.cloud));
+  // Preprocessing and registration; a cloud that is at fault does not use up the guess
+  RawCloud raw{std::move(seen.cloud), seen.total, placeRegion(header), start.T_cloud_preoperative};
+  started = std::chrono::steady_clock::now();
+  const Preprocessed ready = preprocess(std::move(raw), organ.cloud.points, registrar_->settings());
+  const double preprocessing = millisecondsSince(started);
+  fillIn(ready.stages, attempt.result);
+  Registration registration = registerReady(organ.cloud, ready, start);
   if (registration.status == Status::kInvalidInput && !job.detached) guess_ = guess;
-  registration.stages.insert(registration.stages.begin(), {"conversion", conversion.count()});
+  registration.stages.insert(registration.stages.begin(),
+                             {{"conversion", conversion}, {"preprocessing", preprocessing}});
   attempt.T_fixed_preoperative =
       T_cloud_fixed.inverse() * registration.T_intraoperative_preoperative;
 
@@ -177,6 +185,29 @@ void Pipeline::attempt(const Job& job, const Attempt* accepted, ros::Time now, A
                  {names::kConfidenceField, deformation.confidence(organ.cloud.points)}},
                 organ, header);
   attempt.rigid = toMessage(deformation.moveRigidly(organ.cloud.points), {}, organ, header);
+}
+
+/// What the cloud is cropped to, at its stamp.
+std::optional<Region> Pipeline::placeRegion(const std_msgs::Header& cloud) const {
+  if (!settings_.region) return std::nullopt;
+  const std::string& frame =
+      settings_.region_frame.empty() ? cloud.frame_id : settings_.region_frame;
+  return Region{*settings_.region,
+                bridge_.lookUp(frame, cloud.frame_id, cloud.stamp, settings_.tf_timeout)};
+}
+
+Registration Pipeline::registerReady(const PointCloud& organ, const Preprocessed& ready,
+                                     const Start& start) {
+  if (!ready.fault) {
+    return registrar_->registerClouds(organ, ready.cloud,
+                                      start.T_cloud_preoperative
+                                          ? *start.T_cloud_preoperative
+                                          : alignCentroids(organ, ready.cloud));
+  }
+  Registration registration;
+  registration.status = Status::kInvalidInput;
+  registration.message = *ready.fault;
+  return registration;
 }
 
 Pipeline::Start Pipeline::chooseStart(const Job& job,

@@ -12,6 +12,7 @@
 #include "mailbox.hpp"
 #include "parameters.hpp"
 #include "tf_bridge.hpp"
+#include "unirit/preprocessing.hpp"
 #include "unirit/registration.hpp"
 
 namespace unirit {
@@ -25,8 +26,8 @@ struct Attempt {
   Eigen::Isometry3d T_fixed_preoperative = Eigen::Isometry3d::Identity();
 };
 
-/// From a job to an attempt: checks the messages, looks up frames, chooses the start, registers and
-/// judges. Used by the worker thread alone.
+/// From a job to an attempt: checks the messages, looks up frames, chooses the start, makes the
+/// cloud ready, registers and judges. Used by the worker thread alone.
 class Pipeline {
  public:
   /// Reads the weights; where they or the parameters cannot be used every attempt fails with the
@@ -54,6 +55,9 @@ class Pipeline {
   void checkMessages(const Job& job, ros::Time now) const;
   Eigen::Isometry3d placeCloud(const Job& job, const std::string& fixed_frame);
   std::optional<Eigen::Vector3f> placeSensor(const std_msgs::Header& cloud) const;
+  std::optional<Region> placeRegion(const std_msgs::Header& cloud) const;
+  Registration registerReady(const PointCloud& organ, const Preprocessed& ready,
+                             const Start& start);
   Start chooseStart(const Job& job, const std::optional<geometry_msgs::PoseStamped>& guess,
                     const Attempt* accepted, const Eigen::Isometry3d& T_cloud_fixed) const;
   Eigen::Isometry3d placeGuess(const geometry_msgs::PoseStamped& guess,

@@ -49,6 +49,13 @@ void fillIn(const Registration& registration, double inlier_tolerance, Registrat
   }
 }
 
+void fillIn(const std::vector<StagePoints>& preprocessing, RegistrationResult& result) {
+  for (const StagePoints& stage : preprocessing) {
+    result.preprocessing_stages.push_back(stage.stage);
+    result.preprocessing_points.push_back(static_cast<std::uint32_t>(stage.points));
+  }
+}
+
 Eigen::Isometry3d fromMessage(const geometry_msgs::Pose& pose, const std::string& name) {
   const auto& p = pose.position;
   const auto& q = pose.orientation;

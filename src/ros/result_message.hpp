@@ -7,13 +7,18 @@
 
 #include <Eigen/Geometry>
 #include <string>
+#include <vector>
 
+#include "unirit/preprocessing.hpp"
 #include "unirit/registration.hpp"
 
 namespace unirit {
 
 /// Fills in what the core found; header, id, frames, start and hashes stay as they are.
 void fillIn(const Registration& registration, double inlier_tolerance, RegistrationResult& result);
+
+/// Fills in what the preprocessing left of the cloud.
+void fillIn(const std::vector<StagePoints>& preprocessing, RegistrationResult& result);
 
 /// Pose as a transform, its quaternion renormalised. Throws Refusal (INVALID_INPUT) with a sentence
 /// that begins with `name` where it is not finite or its quaternion is not nearly of unit length.

@@ -4,7 +4,6 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <iostream>
 
 namespace unirit {
@@ -27,6 +26,12 @@ std::string onOneLine(std::string text) {
   return text;
 }
 
+template <std::size_t N>
+void requireFinite(const char* option, const std::array<double, N>& numbers) {
+  if (Eigen::Map<const Eigen::Array<double, N, 1>>(numbers.data()).allFinite()) return;
+  throw CLI::ValidationError(option, "must be " + std::to_string(N) + " finite numbers");
+}
+
 }  // namespace
 
 ParsedOptions parseRegisterOptions(int argc, char** argv) {
@@ -34,6 +39,7 @@ ParsedOptions parseRegisterOptions(int argc, char** argv) {
   RegisterOptions& options = parsed.options;
   std::string units = "mm";
   std::array<double, 3> viewpoint{};
+  std::array<double, 6> region{};
 
   CLI::App app(kDescription, "unirit_register");
   app.footer(kExitStatus);
@@ -58,6 +64,11 @@ ParsedOptions parseRegisterOptions(int argc, char** argv) {
                      "where the sensor stood, in INTRAOP's frame and unit; default: what a PCD "
                      "says, else unknown")
           ->type_name("X Y Z");
+  const CLI::Option* region_option =
+      app.add_option("--region", region,
+                     "two corners of a box in INTRAOP's frame and unit; what lies outside of it is "
+                     "left out")
+          ->type_name("X Y Z X Y Z");
   app.add_option("--units", units, "unit of all files: mm or m")
       ->check(CLI::IsMember({"mm", "m"}))
       ->capture_default_str();
@@ -68,10 +79,8 @@ ParsedOptions parseRegisterOptions(int argc, char** argv) {
 
   try {
     app.parse(argc, argv);
-    if (!std::all_of(viewpoint.begin(), viewpoint.end(),
-                     [](double x) { return std::isfinite(x); })) {
-      throw CLI::ValidationError("--viewpoint", "must be three finite numbers");
-    }
+    requireFinite("--viewpoint", viewpoint);
+    requireFinite("--region", region);
   } catch (const CLI::Success& help) {
     parsed.exit_status = app.exit(help);
   } catch (const CLI::Error& error) {
@@ -81,6 +90,11 @@ ParsedOptions parseRegisterOptions(int argc, char** argv) {
   options.unit = units == "m" ? 1.0 : 0.001;
   if (viewpoint_option->count() > 0) {
     options.viewpoint = (options.unit * Eigen::Vector3d(viewpoint.data())).cast<float>();
+  }
+  if (region_option->count() > 0) {
+    const Eigen::Vector3d a = options.unit * Eigen::Map<const Eigen::Vector3d>(region.data());
+    const Eigen::Vector3d b = options.unit * Eigen::Map<const Eigen::Vector3d>(region.data() + 3);
+    options.region.emplace(a.cwiseMin(b), a.cwiseMax(b));
   }
   return parsed;
 }

@@ -11,6 +11,7 @@
 #include "unirit/io/settings_yaml.hpp"
 #include "unirit/io/surface_io.hpp"
 #include "unirit/normals.hpp"
+#include "unirit/preprocessing.hpp"
 #include "unirit/registration.hpp"
 #include "unirit/sampling.hpp"
 
@@ -90,12 +91,23 @@ PointCloud cloudOf(const SurfaceFile& file, int sampled_points, std::uint64_t se
   return cloud;
 }
 
-Registration registerSurfaces(const Job& job, std::uint64_t seed) {
+/// What came of a job, and of the points of its intra-operative file.
+struct Outcome {
+  std::vector<StagePoints> preprocessing;
+  Registration registration;
+};
+
+Outcome registerSurfaces(const Job& job, const RegisterOptions& options) {
   const int points = job.settings.sampling.points;
-  const PointCloud preoperative = cloudOf(job.preoperative, points, seed);
-  const PointCloud intraoperative = cloudOf(job.intraoperative, points, seed + 1);
-  return Registrar(job.weights, job.settings)
-      .registerClouds(preoperative, intraoperative, alignCentroids(preoperative, intraoperative));
+  const PointCloud preoperative = cloudOf(job.preoperative, points, options.seed);
+  RawCloud raw{cloudOf(job.intraoperative, points, options.seed + 1)};
+  raw.received = raw.cloud.size() + job.intraoperative.dropped;
+  if (options.region) raw.region = Region{*options.region, Eigen::Isometry3d::Identity()};
+  const Preprocessed ready = preprocess(std::move(raw), preoperative.points, job.settings);
+  if (ready.fault) throw std::runtime_error(*ready.fault);
+  return {ready.stages, Registrar(job.weights, job.settings)
+                            .registerClouds(preoperative, ready.cloud,
+                                            alignCentroids(preoperative, ready.cloud))};
 }
 
 void openFolder(const std::string& folder) {
@@ -106,11 +118,10 @@ void openFolder(const std::string& folder) {
   }
 }
 
-void writeResults(const Job& job, const Registration& registration,
-                  const RegisterOptions& options) {
+void writeResults(const Job& job, const Outcome& outcome, const RegisterOptions& options) {
   const auto path = [&](const char* name) { return (fs::path(options.output) / name).string(); };
   const Points& vertices = job.preoperative.surface.vertices.points;
-  const Deformation& deformation = *registration.deformation;
+  const Deformation& deformation = *outcome.registration.deformation;
   Surface moved{{deformation.moveRigidly(vertices), {}}, job.preoperative.surface.faces};
   writePly(moved, path("rigid.ply"), options.unit);
   moved.vertices.points = deformation.movedSurface().leftCols(vertices.cols());
@@ -120,10 +131,11 @@ void writeResults(const Job& job, const Registration& registration,
   }
 
   std::ofstream result(path("result.json"));
-  result << toJson(registration, {fs::path(options.preoperative).filename().string(),
-                                  fs::path(options.intraoperative).filename().string(), "centroids",
-                                  job.settings.plausibility.inlier_tolerance, job.weights->sha256,
-                                  sha256(job.settings)});
+  result << toJson(
+      outcome.registration,
+      {fs::path(options.preoperative).filename().string(),
+       fs::path(options.intraoperative).filename().string(), "centroids", outcome.preprocessing,
+       job.settings.plausibility.inlier_tolerance, job.weights->sha256, sha256(job.settings)});
   result.close();
   if (!result) throw std::runtime_error("Cannot write \"" + path("result.json") + "\".");
 }
@@ -147,10 +159,11 @@ int fail(ExitStatus status, const std::string& sentence) {
 
 int run(const RegisterOptions& options) {
   Job job;
-  Registration registration;
+  Outcome outcome;
+  const Registration& registration = outcome.registration;
   try {
     job = prepare(options);
-    registration = registerSurfaces(job, options.seed);
+    outcome = registerSurfaces(job, options);
     if (registration.status == Status::kInvalidInput)
       throw std::runtime_error(registration.message);
     if (registration.deformation) openFolder(options.output);
@@ -158,7 +171,7 @@ int run(const RegisterOptions& options) {
     return fail(kUnusable, error.what());
   }
   if (!registration.deformation) return fail(kInternalFailure, registration.message);
-  writeResults(job, registration, options);
+  writeResults(job, outcome, options);
   report(job, registration, options.output);
   return registration.succeeded() ? kRegistered : kRefused;
 }

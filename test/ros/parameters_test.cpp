@@ -53,7 +53,10 @@ TEST(Settings, yamlAndStructHoldTheSameDefaults) {
   EXPECT_EQ(yaml["invert_tf"].as<bool>(), node.invert_tf);
   EXPECT_EQ(yaml["tf_rate"].as<double>(), node.tf_rate);
   EXPECT_EQ(yaml["tf_timeout"].as<double>(), node.tf_timeout);
-  EXPECT_EQ(yaml.size(), 11U) << "a name in the file that nothing here compares";
+  EXPECT_EQ(yaml["preprocessing/region"].size(), 0U);
+  EXPECT_FALSE(node.region);
+  EXPECT_EQ(yaml["preprocessing/region_frame"].as<std::string>(), node.region_frame);
+  EXPECT_EQ(yaml.size(), 13U) << "a name in the file that nothing here compares";
 }
 
 TEST(Settings, readmeStatesTheSameDefaults) {

@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -156,7 +157,9 @@ TEST_F(RegisterTool, ResultHasTheMessagesFieldsInMetres) {
                                     "displacement_max",
                                     "stage_milliseconds",
                                     "weights_sha256",
-                                    "preoperative_frame"};
+                                    "preoperative_frame",
+                                    "preprocessing_stages",
+                                    "preprocessing_points"};
   std::set<std::string> found;
   for (const auto& [name, value] : json.items()) found.insert(name);
   EXPECT_EQ(found, names);
@@ -256,6 +259,48 @@ TEST_F(RegisterTool, ViewpointIsThatOfTheCommandLineOrElseOfAPcd) {
   EXPECT_NE(placed, deformedWith("placed.pcd --viewpoint 0 0 -900"));
 }
 
+TEST_F(RegisterTool, CountsWhatThePreprocessingLeaves) {
+  Surface seen = readSurface(at("seen.ply"), kMillimetre).surface;
+  const Eigen::Index size = seen.vertices.size();
+  seen.vertices.points(1, 3) = std::nanf("");
+  writePly(seen, at("holey.ply"), kMillimetre);
+  ASSERT_EQ(run("organ.ply holey.ply --weights weights.safetensors --settings settings.yaml "
+                "--output out"),
+            0)
+      << contents(at("stderr"));
+  const nlohmann::json json = result();
+  EXPECT_EQ(json["preprocessing_stages"],
+            (std::vector<std::string>{"received", "valid", "outliers", "voxel"}));
+  EXPECT_EQ(json["preprocessing_points"].size(), 4U);
+  EXPECT_EQ(json["preprocessing_points"][0], size);
+  EXPECT_EQ(json["preprocessing_points"][1], size - 1);
+}
+
+TEST_F(RegisterTool, RegionLeavesTheRestOut) {
+  const Surface seen = readSurface(at("seen.ply"), kMillimetre).surface;
+  Surface scene = seen;
+  const Eigen::Index size = seen.vertices.size();
+  scene.vertices.points.conservativeResize(Eigen::NoChange, 2 * size);
+  scene.vertices.points.rightCols(size) =
+      seen.vertices.points.colwise() + Eigen::Vector3f(0.0F, 0.0F, 0.4F);
+  writePly(seen, at("alone.ply"), kMillimetre);
+  writePly(scene, at("scene.ply"), kMillimetre);
+  const std::string others =
+      " --weights weights.safetensors --settings settings.yaml --output out ";
+  ASSERT_EQ(run("organ.ply alone.ply" + others), 0);
+  const std::string alone = contents(at("out/deformed.ply"));
+  ASSERT_EQ(run("organ.ply scene.ply" + others + "--region 500 500 600 -500 -500 0"), 0)
+      << contents(at("stderr"));
+  EXPECT_TRUE(contents(at("out/deformed.ply")) == alone);
+  const nlohmann::json json = result();
+  EXPECT_EQ(json["preprocessing_stages"][2], "region");
+  EXPECT_EQ(json["preprocessing_points"][1], 2 * size);
+  EXPECT_EQ(json["preprocessing_points"][2], size);
+  fs::remove_all(at("out"));
+  expectRefusal("organ.ply scene.ply" + others + "--region 0 0 -2 1 1 -1",
+                "preprocessing/region leaves 0 of");
+}
+
 TEST_F(RegisterTool, TurnsOrgansThatAreInsideOut) {
   Surface organ = readSurface(at("organ.ply"), kMillimetre).surface;
   ASSERT_EQ(run(kUsual), 0);
@@ -323,6 +368,8 @@ TEST_F(RegisterTool, MisuseIsOneSentenceAndNothingWritten) {
   expectRefusal(usual + "--viewpoint 1 2 3 4", "4");
   expectRefusal(usual + "--viewpoint 1 2 x", "--viewpoint");
   expectRefusal(usual + "--viewpoint 1 2 nan", "--viewpoint");
+  expectRefusal(usual + "--region 1 2 3 4 5", "--region");
+  expectRefusal(usual + "--region 1 2 3 4 5 inf", "--region");
   expectRefusal(usual + "--stages rigid,refined", "'refined'");
   expectRefusal(usual + "--stages nonrigid,rigid", "order");
   expectRefusal(usual + "--correspondence lines", "'lines'");

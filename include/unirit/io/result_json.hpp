@@ -2,7 +2,9 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
+#include "unirit/preprocessing.hpp"
 #include "unirit/registration.hpp"
 
 namespace unirit {
@@ -12,7 +14,8 @@ struct ResultOrigin {
   std::string preoperative_frame;    ///< or the name of the pre-operative file
   std::string intraoperative_frame;  ///< or the name of the intra-operative file
   std::string start;                 ///< where the registration began, such as "centroids"
-  double inlier_tolerance = 0.0;     ///< [m]
+  std::vector<StagePoints> preprocessing;
+  double inlier_tolerance = 0.0;  ///< [m]
   std::string weights_sha256;
   std::string settings_sha256;
 };
