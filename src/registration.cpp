@@ -38,14 +38,20 @@ Points normalsOf(const PointCloud& cloud, const std::vector<Eigen::Index>& sampl
   return outwardNormals(select(cloud.points, samples));
 }
 
-/// Runs a stage and notes how long it took.
+/// Runs a stage, or more of it, and notes how long it took.
 template <class Work>
 void timed(const char* stage, std::vector<StageTime>& stages, Work&& work) {
   const auto start = std::chrono::steady_clock::now();
   work();
   const std::chrono::duration<double, std::milli> elapsed =
       std::chrono::steady_clock::now() - start;
-  stages.push_back({stage, elapsed.count()});
+  const auto known = std::find_if(stages.begin(), stages.end(),
+                                  [&](const StageTime& time) { return time.stage == stage; });
+  if (known == stages.end()) {
+    stages.push_back({stage, elapsed.count()});
+  } else {
+    known->milliseconds += elapsed.count();
+  }
 }
 
 Registration ended(Status status, std::string message, std::vector<PlausibilityCheck> checks = {}) {
@@ -68,6 +74,11 @@ double surprise(const Refined& refined) {
   const auto prior = static_cast<double>(refined.coefficients.size());
   const double learnt = prior - static_cast<double>(refined.covariance_factor.squaredNorm());
   return refined.coefficients.norm() / std::sqrt(std::max(learnt, 1.0));
+}
+
+void keepBetter(const Refined& other, Refined& refined) {
+  const double margin = refined.whole ? kClearlyBetterWhole : kClearlyBetterView;
+  if (other.fit > refined.fit + margin) refined = other;
 }
 
 }  // namespace
@@ -116,14 +127,17 @@ struct Registrar::Implementation {
   }
 
   Registration run(const PointCloud& preoperative, const PointCloud& intraoperative,
-                   const Eigen::Isometry3d& guess);
+                   const Eigen::Isometry3d& guess, const Earlier* earlier);
 
   PointCloud sample(const PointCloud& cloud, const Eigen::Isometry3d& T_organ_cloud) const;
-  Refined refine(const PointCloud& target, const Eigen::Isometry3f& rigid,
-                 const Points& displacements);
-  Eigen::Isometry3d toMetres(const Eigen::Isometry3f& pose) const;
+  Refined refineFrom(const Eigen::Isometry3f& start, const PointCloud& target,
+                     const Points& displacements);
+  Refined refineFromStart(const PointCloud& target, const Eigen::Isometry3d& guess,
+                          const Earlier* earlier);
   RefinementQuality qualityOf(const Refined& refined, const Points& target,
                               const Deformation& deformation) const;
+  Eigen::Isometry3d toMetres(const Eigen::Isometry3f& pose) const;
+  Eigen::Isometry3f toNetwork(const Eigen::Isometry3d& pose) const;
   std::shared_ptr<const Deformation> deformationOf(const PointCloud& preoperative,
                                                    const Eigen::Isometry3d& pose,
                                                    const Points& displacements,
@@ -137,14 +151,14 @@ struct Registrar::Implementation {
   std::unique_ptr<Model> model;
 };
 
-/// The paper's figure: sample, normalise, move rigidly, displace, map back to metres; in between
-/// the refinement.
+/// The paper's figure: sample, normalise, move rigidly, displace, map back to metres. Where the
+/// refinement fits well from the start, the network's modules are passed over.
 Registration Registrar::Implementation::run(const PointCloud& preoperative,
                                             const PointCloud& intraoperative,
-                                            const Eigen::Isometry3d& guess) {
+                                            const Eigen::Isometry3d& guess,
+                                            const Earlier* earlier) {
   Registration registration = ended(Status::kSucceeded, "registered");
   auto& stages = registration.stages;
-  const bool refines = contains(settings.stages, Stage::kRefine);
 
   // Bring the seen cloud to the organ's frame, sample both
   PointCloud target;
@@ -153,9 +167,15 @@ Registration Registrar::Implementation::run(const PointCloud& preoperative,
     target = sample(intraoperative, guess.inverse());
   });
 
+  // Refinement from the start
+  std::optional<Refined> refined;
+  const bool refines = contains(settings.stages, Stage::kRefine);
+  if (refines) timed("refine", stages, [&] { refined = refineFromStart(target, guess, earlier); });
+  const bool fits = refined && refined->fit > kPoorFit;
+
   // Rigid module
   Eigen::Isometry3f rigid = Eigen::Isometry3f::Identity();
-  if (contains(settings.stages, Stage::kRigid)) {
+  if (contains(settings.stages, Stage::kRigid) && !fits) {
     timed("rigid", stages,
           [&] { rigid = network.estimateRigid(model->sampled.points, target.points); });
   }
@@ -163,19 +183,19 @@ Registration Registrar::Implementation::run(const PointCloud& preoperative,
   // Non-rigid module, decoded at every point of the organ or where the refinement starts from
   const Points& queries = refines ? model->sampled.points : model->vertices;
   Points displacements = Points::Zero(3, queries.cols());
-  if (contains(settings.stages, Stage::kNonRigid)) {
+  if (contains(settings.stages, Stage::kNonRigid) && !fits) {
     timed("nonrigid", stages, [&] {
       displacements = network.estimateDisplacements(rigid * model->sampled.points, target.points,
                                                     rigid * queries);
     });
   }
 
-  // Refinement from the guess and from where the network left the organ
-  std::optional<Refined> refined;
-  if (refines) {
-    timed("refine", stages, [&] { refined = refine(target, rigid, displacements); });
-    rigid = refined->pose;
+  // Refinement from where the network left the organ
+  if (refined && !fits && settings.stages.front() != Stage::kRefine) {
+    timed("refine", stages,
+          [&] { keepBetter(refineFrom(rigid, target, displacements), *refined); });
   }
+  if (refined) rigid = refined->pose;
 
   timed("assessment", stages, [&] {
     registration.T_intraoperative_preoperative = guess * toMetres(rigid);
@@ -188,14 +208,15 @@ Registration Registrar::Implementation::run(const PointCloud& preoperative,
     registration.displacement =
         displacementStatistics(registration.deformation->displacements(),
                                registration.deformation->jacobians(model->samples));
+    if (refined && settings.refinement.correspondence == Correspondence::kSurface) {
+      registration.refinement = qualityOf(*refined, target.points, *registration.deformation);
+    }
+    applyChecks({checkOverlap(model->sampled.points, target.points,
+                              model->extent / model->normalisation.scale, settings.plausibility)},
+                registration);
+    applyChecks(checkOutput(registration, guess, model->extent, settings.plausibility),
+                registration);
   });
-  if (refined && settings.refinement.correspondence == Correspondence::kSurface) {
-    registration.refinement = qualityOf(*refined, target.points, *registration.deformation);
-  }
-  applyChecks({checkOverlap(model->sampled.points, target.points,
-                            model->extent / model->normalisation.scale, settings.plausibility)},
-              registration);
-  applyChecks(checkOutput(registration, guess, model->extent, settings.plausibility), registration);
   return registration;
 }
 
@@ -211,42 +232,62 @@ PointCloud Registrar::Implementation::sample(const PointCloud& cloud,
   return sampled;
 }
 
-/// The refinement from the guess or, where that fits poorly, from where the network left the organ
-/// if that fits clearly better.
-Refined Registrar::Implementation::refine(const PointCloud& target, const Eigen::Isometry3f& rigid,
-                                          const Points& displacements) {
-  const auto refineFrom = [&](const Eigen::Isometry3f& start, const Points& moved) {
-    const Eigen::Isometry3f to_start = start.inverse();
-    PointCloud seen{to_start * target.points, {}};
-    if (target.viewpoint) seen.viewpoint = to_start * *target.viewpoint;
-    Refined refined = model->refinement->refine(seen, to_start.linear() * moved);
-    refined.pose = start * refined.pose;
-    return refined;
-    if (refined.eye) refined.eye = start * *refined.eye;
+/// The refinement from a pose, and about it; displacements of the samples after it.
+Refined Registrar::Implementation::refineFrom(const Eigen::Isometry3f& start,
+                                              const PointCloud& target,
+                                              const Points& displacements) {
+  const Eigen::Isometry3f to_start = start.inverse();
+  PointCloud seen{to_start * target.points, {}};
+  if (target.viewpoint) seen.viewpoint = to_start * *target.viewpoint;
+  Refined refined = model->refinement->refine(
+      seen, {Eigen::Isometry3f::Identity(), to_start.linear() * displacements});
+  refined.pose = start * refined.pose;
+  if (refined.eye) refined.eye = start * *refined.eye;
+  return refined;
+}
+
+/// A short search from what was found earlier, if anything was; a whole one from the guess where
+/// nothing was or it fits poorly.
+Refined Registrar::Implementation::refineFromStart(const PointCloud& target,
+                                                   const Eigen::Isometry3d& guess,
+                                                   const Earlier* earlier) {
+  const auto afar = [&] {
+    return refineFrom(Eigen::Isometry3f::Identity(), target,
+                      Points::Zero(3, model->sampled.size()));
   };
-  Refined from_guess =
-      refineFrom(Eigen::Isometry3f::Identity(), Points::Zero(3, model->sampled.size()));
-  if (settings.stages.front() == Stage::kRefine || from_guess.fit > kPoorFit) return from_guess;
-  Refined from_network = refineFrom(rigid, displacements);
-  const double margin = from_guess.whole ? kClearlyBetterWhole : kClearlyBetterView;
-  return from_network.fit > from_guess.fit + margin ? from_network : from_guess;
+  if (earlier == nullptr) return afar();
+  const Deformation& found = *earlier->deformation;
+  const Points moved = found.move(model->samples) - found.moveRigidly(model->samples);
+  const Eigen::Matrix3f to_organ = found.rigidTransform().linear().transpose().cast<float>();
+  Refined refined = model->refinement->refine(
+      target, {toNetwork(guess.inverse() * earlier->T_intraoperative_preoperative),
+               to_organ * moved / model->normalisation.scale, true});
+  if (refined.fit < kPoorFit) keepBetter(afar(), refined);
+  return refined;
+}
+
+/// `target`: in the network's unit and the organ's frame.
+RefinementQuality Registrar::Implementation::qualityOf(const Refined& refined, const Points& target,
+                                                       const Deformation& deformation) const {
+  const Agreement agreement = model->refinement->agreement(target, refined);
+  return {refined.fit, surprise(refined), agreement.missing,
+          deformation.confidence(model->samples).mean(), agreement.residual_left};
 }
 
 Eigen::Isometry3d Registrar::Implementation::toMetres(const Eigen::Isometry3f& pose) const {
-  /// `target`: in the network's unit and the organ's frame.
-  RefinementQuality Registrar::Implementation::qualityOf(
-      const Refined& refined, const Points& target, const Deformation& deformation) const {
-    const Agreement agreement = model->refinement->agreement(target, refined);
-    return {refined.fit, surprise(refined), agreement.missing,
-            deformation.confidence(model->samples).mean(), agreement.residual_left};
-  }
-
   const auto scale = static_cast<double>(model->normalisation.scale);
   const Eigen::Vector3d offset = model->normalisation.offset.cast<double>();
   Eigen::Isometry3d moved = pose.cast<double>();
   moved.linear() = Eigen::Quaterniond(moved.linear()).normalized().toRotationMatrix();
   moved.translation() = scale * moved.translation() + offset - moved.linear() * offset;
   return moved;
+}
+
+Eigen::Isometry3f Registrar::Implementation::toNetwork(const Eigen::Isometry3d& pose) const {
+  const Eigen::Vector3d offset = model->normalisation.offset.cast<double>();
+  Eigen::Isometry3d moved = pose;
+  moved.translation() = (pose * offset - offset) / static_cast<double>(model->normalisation.scale);
+  return moved.cast<float>();
 }
 
 /// `displacements`: of every point of the organ, in the network's unit, where nothing was refined.
@@ -280,7 +321,7 @@ void Registrar::setSettings(const RegistrationSettings& settings) {
 
 Registration Registrar::registerClouds(const PointCloud& preoperative,
                                        const PointCloud& intraoperative,
-                                       const Eigen::Isometry3d& guess) try {
+                                       const Eigen::Isometry3d& guess, const Earlier* earlier) try {
   const PlausibilitySettings& limits = implementation_->settings.plausibility;
   const PointCloud organ = dropInvalid(preoperative);
   const PointCloud seen = dropInvalid(intraoperative);
@@ -292,7 +333,7 @@ Registration Registrar::registerClouds(const PointCloud& preoperative,
   if (!guess.matrix().allFinite()) {
     return ended(Status::kInvalidInput, "the initial guess is not finite");
   }
-  Registration registration = implementation_->run(organ, seen, guess);
+  Registration registration = implementation_->run(organ, seen, guess, earlier);
   registration.checks.insert(registration.checks.begin(), checks.begin(), checks.end());
   return registration;
 } catch (const std::exception& error) {

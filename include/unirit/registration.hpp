@@ -50,6 +50,12 @@ struct Registration {
   bool succeeded() const { return status == Status::kSucceeded; }
 };
 
+/// What was found a moment ago for the same organ.
+struct Earlier {
+  Eigen::Isometry3d T_intraoperative_preoperative;  ///< to the present intra-operative frame
+  std::shared_ptr<const Deformation> deformation;   ///< in its own one
+};
+
 /// Registers a pre-operative surface to an intra-operative cloud: the page a user of the library
 /// reads. Keeps buffers and the sampled organ between calls, so use one Registrar per thread.
 class Registrar {
@@ -59,10 +65,12 @@ class Registrar {
   ~Registrar();
 
   /// `guess` takes the pre-operative frame to the intra-operative one. Clouds may have any number
-  /// of points, in any order; points that are not finite are dropped. Never throws on bad clouds:
-  /// the status and sentence say what is wrong.
+  /// of points, in any order; points that are not finite are dropped. `earlier`: where the
+  /// refinement begins, which then is short; the pose is still expected about the guess, so that
+  /// errors do not add up over a stream of views. Never throws on bad clouds: the status and
+  /// sentence say what is wrong.
   Registration registerClouds(const PointCloud& preoperative, const PointCloud& intraoperative,
-                              const Eigen::Isometry3d& guess);
+                              const Eigen::Isometry3d& guess, const Earlier* earlier = nullptr);
 
   const RegistrationSettings& settings() const;
 

@@ -43,8 +43,9 @@ struct NetworkSettings {
 /// The coherent refinement. Lengths scale with the organ.
 struct RefinementSettings {
   Correspondence correspondence = Correspondence::kSurface;
-  int pose_iterations = 12;  ///< of the pose alone, where the whole surface is seen
+  int pose_iterations = 40;  ///< of the pose alone, with few points
   int iterations = 24;       ///< of pose and displacement
+  int warm_iterations = 8;   ///< of both, where they begin at the registration before
   double last_sigma = 0.02;  ///< deviation of the cloud from the surface at the end, over the
                              ///< organ's half extent
 };
@@ -128,8 +129,10 @@ void visitSettings(Settings& settings, Visitor&& visitor) {
           "iterations of the rigid module");
   auto& r = settings.refinement;
   visitor("refinement/pose_iterations", r.pose_iterations, 0, 100,
-          "iterations of the pose alone, where the whole surface is seen");
+          "iterations of the pose alone, with few points");
   visitor("refinement/iterations", r.iterations, 1, 200, "iterations of pose and displacement");
+  visitor("refinement/warm_iterations", r.warm_iterations, 1, 200,
+          "iterations of both, where they begin at the registration before");
   visitor("refinement/last_sigma", r.last_sigma, 0.002, 0.1,
           "deviation of the cloud from the surface at the end, over the organ's half extent");
   visitor("plausibility/min_points", p.min_points, 4, 100000, "fewest points in either cloud");

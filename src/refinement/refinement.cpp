@@ -1,36 +1,36 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "refinement.hpp"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 
 #include "unirit/metrics.hpp"
-#include "unirit/normals.hpp"
+#include "unirit/sampling.hpp"
 
 namespace unirit {
 namespace {
 
-// Lengths in half extents of the organ. The prior's are the covariance that random thin-plate
-// deformations of training organs have; the others gave the smallest errors on such organs.
-constexpr double kPriorLength = 0.4;
+// Lengths in half extents of the organ, but the first. The prior's are the covariance that random
+// thin-plate deformations of training organs have; the others gave the smallest errors on such
+// organs.
+constexpr double kPriorLength = 0.28;  // in mean sides of the organ's box
 constexpr double kPriorAmplitude = 0.087;
 constexpr int kRank = 48;
 // A view tells little of the pose, a whole surface nearly all
 constexpr PosePrior kViewPose{0.07F, 0.035F};
 constexpr PosePrior kWholePose{0.2F, 0.1F};
-constexpr float kWidestSigma = 0.4F;    // where the pose alone is sought
-constexpr float kFirstSigma = 0.12F;    // where the displacement joins it
+constexpr Eigen::Index kCoarsePoints = 256;  // where the pose alone is sought
+constexpr float kWidestSigma = 0.4F;         // where that begins
+constexpr float kNarrowSigma = 0.06F;        // and ends
+constexpr float kFirstSigma = 0.12F;         // where pose and displacement are sought from afar
+constexpr float kNearSigma = 0.04F;          // and where the search begins near its end
+constexpr float kWholeSharpness = 0.75F;     // last sigma of a whole surface over that of a view
 constexpr float kSurfaceAcross = 0.2F;  // deviation along the surface, which geometry hardly sees
 constexpr float kPointsAcross = 0.01F;
 constexpr int kPointsPatience = 2;  // times the iterations: points are told apart late
 constexpr float kSurfaceWeight = 0.3F;
-// Mean normal of a surface seen from all sides, at most; a viewpoint speaks for one side
-constexpr double kWholeOpenness = 0.25;
-constexpr double kWholeOpennessFromViewpoint = 0.1;
-constexpr float kNearby = 0.1F;         // a point without a neighbour within it is not seen
-constexpr float kFar = 8.0F;            // a viewpoint that is not known lies so far away
-constexpr float kGrazingCosine = 0.2F;  // surely seen from kGrazingCosine + kGrazingRange on
-constexpr float kGrazingRange = 0.3F;
+constexpr float kNearby = 0.1F;  // a point without a neighbour within it is not seen
 
 /// Geometric sequence from `first` to `last` in `steps`.
 float annealed(float first, float last, int step, int steps) {
@@ -38,89 +38,115 @@ float annealed(float first, float last, int step, int steps) {
   return first * std::pow(last / first, static_cast<float>(step) / static_cast<float>(steps));
 }
 
-/// Whether the outward normals look to the viewpoint on the whole; from a wrong one, such as that
-/// of another frame, they mostly look away.
-bool faces(const PointCloud& seen, const Eigen::Vector3f& viewpoint) {
-  const Points rays = ((-seen.points).colwise() + viewpoint).colwise().normalized();
-  return seen.normals.cwiseProduct(rays).sum() > 0.0F;
+PointCloud pick(const PointCloud& cloud, const std::vector<Eigen::Index>& samples) {
+  return {select(cloud.points, samples), select(cloud.normals, samples)};
+}
+
+/// Geometric mean of the sides of a box along the principal axes.
+double boxSide(const Points& points) {
+  const Points centred = points.colwise() - centroid(points);
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3f> axes(centred * centred.transpose());
+  const Points along = axes.eigenvectors().transpose() * centred;
+  const Eigen::Vector3f sides = along.rowwise().maxCoeff() - along.rowwise().minCoeff();
+  return std::cbrt(static_cast<double>(sides.prod()));
+}
+
+Attraction attractionOf(Correspondence correspondence, bool whole) {
+  Attraction attraction;
+  attraction.normals = whole ? NormalUse::kUnsigned : NormalUse::kSigned;
+  if (correspondence == Correspondence::kPoints) {
+    attraction.normals = NormalUse::kNone;
+    attraction.symmetry = 0.0F;
+  }
+  return attraction;
 }
 
 }  // namespace
 
+/// The expectation step of one search, with a sampling of the organ.
+class Refinement::Expectation {
+ public:
+  Expectation(const PointCloud& source, const Sighting& sighting, const Refinement& refinement)
+      : source_(source),
+        sighting_(sighting),
+        attraction_(attractionOf(refinement.settings_.correspondence, sighting.whole)),
+        estimator_(sighting.seen, refinement.kernels_, refinement.team_) {}
+
+  const Correspondences& at(const CoherentState& state, float sigma) {
+    attraction_.sigma = sigma;
+    moved_.points = state.pose * (source_.points + state.displacements);
+    moved_.normals = state.pose.linear() * source_.normals;
+    estimator_.estimate(moved_, visibility(moved_, sighting_.eye), attraction_, correspondences_);
+    return correspondences_;
+  }
+
+ private:
+  const PointCloud& source_;
+  const Sighting& sighting_;
+  Attraction attraction_;
+  CorrespondenceEstimator estimator_;
+  PointCloud moved_;
+  Correspondences correspondences_;
+};
+
 Refinement::Refinement(const PointCloud& source, const RefinementSettings& settings,
                        const Kernels& kernels, ThreadTeam& team)
     : source_(source),
+      coarse_samples_(sampleEvenly(source.points, kCoarsePoints)),
+      coarse_(pick(source, coarse_samples_)),
       settings_(settings),
       kernels_(kernels),
       team_(team),
-      prior_(std::make_shared<const DisplacementPrior>(source.points, kPriorLength, kPriorAmplitude,
-                                                       kRank)),
-      solver_(source.points, prior_->functions(source.points), kViewPose, kernels, team) {}
+      area_(sampledArea(source.points)),
+      prior_(std::make_shared<const DisplacementPrior>(
+          source.points, kPriorLength * boxSide(source.points), kPriorAmplitude, kRank)),
+      solver_(source.points, prior_->functions(source.points), kViewPose, kernels, team),
+      coarse_solver_(coarse_.points, prior_->functions(coarse_.points), kViewPose, kernels, team) {}
 
-void Refinement::move(const CoherentState& state) {
-  moved_.points = state.pose * (source_.points + state.displacements);
-  moved_.normals = state.pose.linear() * source_.normals;
-}
-
-/// How sure it is that the camera sees each point: whether it faces it.
-Eigen::RowVectorXf Refinement::visibility(const PointCloud& moved,
-                                          const std::optional<Eigen::Vector3f>& viewpoint) const {
-  if (!viewpoint) return Eigen::RowVectorXf::Ones(moved.size());
-  const Points rays = ((-moved.points).colwise() + *viewpoint).colwise().normalized();
-  const Eigen::RowVectorXf cosines = moved.normals.cwiseProduct(rays).colwise().sum();
-  return ((cosines.array() - kGrazingCosine) / kGrazingRange).max(0.0F).min(1.0F);
-}
-
-Refined Refinement::refine(const PointCloud& target, const Points& displacements) {
-  // A whole surface is seen from all sides, a part from the viewpoint or where its normals point
-  PointCloud seen{target.points, outwardNormals(target.points)};
-  const bool known = target.viewpoint && faces(seen, *target.viewpoint);
-  const bool whole =
-      openness(seen.normals) < (known ? kWholeOpennessFromViewpoint : kWholeOpenness);
-  std::optional<Eigen::Vector3f> eye;
-  if (!whole) {
-    eye = known ? *target.viewpoint
-                : Eigen::Vector3f(centroid(seen.points) +
-                                  kFar * seen.normals.rowwise().mean().normalized());
-    orientTowards(seen.points, *eye, seen.normals);
-  }
-
-  CorrespondenceEstimator estimator(seen, kernels_, team_);
+Trust Refinement::trust(float sigma, float across) const {
   const bool points = settings_.correspondence == Correspondence::kPoints;
-  Attraction attraction;
-  attraction.normals = whole ? NormalUse::kUnsigned : NormalUse::kSigned;
-  if (points) {
-    attraction.normals = NormalUse::kNone;
-    attraction.symmetry = 0.0F;
-  }
-  solver_.restart(whole ? kWholePose : kViewPose);
-  CoherentState state{Eigen::Isometry3f::Identity(), Eigen::Matrix3Xf::Zero(3, solver_.rank()),
-                      displacements};
-  const auto expect = [&](float sigma) {
-    attraction.sigma = sigma;
-    move(state);
-    estimator.estimate(moved_, visibility(moved_, eye), attraction, correspondences_);
-  };
-  const auto trust = [&](float sigma, float across) {
-    return Trust{sigma, std::hypot(across, sigma), points ? 1.0F : kSurfaceWeight};
-  };
+  return {sigma, std::hypot(across, sigma), points ? 1.0F : kSurfaceWeight};
+}
 
-  const auto last = static_cast<float>(settings_.last_sigma);
-  const int pose_steps = whole ? settings_.pose_iterations : 0;
-  for (int step = 0; step < pose_steps; ++step) {
-    const float sigma = annealed(kWidestSigma, kFirstSigma, step, pose_steps);
-    expect(sigma);
-    solver_.solvePose(correspondences_, trust(sigma, 0.0F), state);
-  }
-  const int steps = points ? kPointsPatience * settings_.iterations : settings_.iterations;
+/// The pose alone, with few points, from wide to narrow.
+Eigen::Isometry3f Refinement::findPose(const Sighting& sighting, const PosePrior& prior,
+                                       const SearchStart& start) {
+  const Sighting coarse{pick(sighting.seen, sampleEvenly(sighting.seen.points, kCoarsePoints)),
+                        sighting.whole, sighting.eye};
+  Expectation expectation(coarse_, coarse, *this);
+  coarse_solver_.restart(prior);
+  CoherentState state{start.pose, {}, select(start.displacements, coarse_samples_)};
+  const int steps = settings_.pose_iterations;
   for (int step = 0; step < steps; ++step) {
-    const float sigma = annealed(kFirstSigma, last, step, steps * 4 / 5);
-    expect(sigma);
-    solver_.solve(correspondences_, trust(sigma, points ? kPointsAcross : kSurfaceAcross), state);
+    const float sigma = annealed(kWidestSigma, kNarrowSigma, step, steps);
+    coarse_solver_.solvePose(expectation.at(state, sigma), trust(sigma, 0.0F), state);
   }
-  expect(last);
-  return {state.pose, state.coefficients,   solver_.covarianceFactor(),
-          whole,      correspondences_.fit, eye};
+  return state.pose;
+}
+
+Refined Refinement::refine(const PointCloud& target, const SearchStart& start) {
+  const Sighting sighting = sightingOf(target, area_);
+  const bool points = settings_.correspondence == Correspondence::kPoints;
+  const PosePrior prior = sighting.whole ? kWholePose : kViewPose;
+  CoherentState state{start.pose, Eigen::Matrix3Xf::Zero(3, solver_.rank()), start.displacements};
+  if (!start.near) state.pose = findPose(sighting, prior, start);
+
+  Expectation expectation(source_, sighting, *this);
+  solver_.restart(prior);
+  const float first = start.near ? kNearSigma : kFirstSigma;
+  const float last = static_cast<float>(settings_.last_sigma) *
+                     (sighting.whole && !points ? kWholeSharpness : 1.0F);
+  const int steps = (start.near ? settings_.warm_iterations : settings_.iterations) *
+                    (points ? kPointsPatience : 1);
+  for (int step = 0; step < steps; ++step) {
+    const float sigma = annealed(first, last, step, steps * 4 / 5);
+    solver_.solve(expectation.at(state, sigma),
+                  trust(sigma, points ? kPointsAcross : kSurfaceAcross), state);
+  }
+  // At the same sigma for whole surfaces and views, to be compared
+  const double fit = expectation.at(state, static_cast<float>(settings_.last_sigma)).fit;
+  return {state.pose, state.coefficients, solver_.covarianceFactor(), sighting.whole,
+          fit,        sighting.eye};
 }
 
 Agreement Refinement::agreement(const Points& target, const Refined& refined) const {

@@ -3,10 +3,12 @@
 
 #include <memory>
 #include <optional>
+#include <vector>
 
 #include "coherent_solver.hpp"
 #include "correspondence.hpp"
 #include "displacement_prior.hpp"
+#include "sighting.hpp"
 #include "unirit/settings.hpp"
 
 namespace unirit {
@@ -19,6 +21,13 @@ struct Refined {
   bool whole = false;                  ///< the target was taken for the whole surface
   double fit = 0.0;                    ///< Correspondences::fit at the end
   std::optional<Eigen::Vector3f> eye;  ///< from where a part is seen, the target's frame
+};
+
+/// Where a search begins. The pose is expected about the identity, wherever it begins.
+struct SearchStart {
+  Eigen::Isometry3f pose = Eigen::Isometry3f::Identity();
+  Points displacements = {};  ///< 3 x N, of the source, before the pose
+  bool near = false;          ///< the end is near: the search is short
 };
 
 /// How far a refined organ and the cloud agree, beside the likelihood that was sought.
@@ -37,9 +46,8 @@ class Refinement {
              ThreadTeam& team);
 
   /// `target`: 3 x M samples of what is seen, about where the source lies, normals are estimated;
-  /// its viewpoint in the same frame, if known. `displacements`: 3 x N, of the source, where the
-  /// search begins.
-  Refined refine(const PointCloud& target, const Points& displacements);
+  /// its viewpoint in the same frame, if known.
+  Refined refine(const PointCloud& target, const SearchStart& start);
 
   /// `target`: 3 x M, the points that were refined to; `refined` in the same frame.
   Agreement agreement(const Points& target, const Refined& refined) const;
@@ -48,18 +56,22 @@ class Refinement {
   const PointCloud& source() const { return source_; }
 
  private:
-  Eigen::RowVectorXf visibility(const PointCloud& moved,
-                                const std::optional<Eigen::Vector3f>& viewpoint) const;
-  void move(const CoherentState& state);
+  class Expectation;
+
+  Eigen::Isometry3f findPose(const Sighting& sighting, const PosePrior& prior,
+                             const SearchStart& start);
+  Trust trust(float sigma, float across) const;
 
   PointCloud source_;
+  std::vector<Eigen::Index> coarse_samples_;
+  PointCloud coarse_;  // a few of the source's points
   RefinementSettings settings_;
   const Kernels& kernels_;
   ThreadTeam& team_;
+  double area_;
   std::shared_ptr<const DisplacementPrior> prior_;
   CoherentSolver solver_;
-  PointCloud moved_;
-  Correspondences correspondences_;
+  CoherentSolver coarse_solver_;  // for the pose alone
 };
 
 }  // namespace unirit

@@ -56,7 +56,8 @@ struct Outcome {
   }
 
   void refine(const Problem& problem) {
-    refined = refinement.refine(problem.target, Points::Zero(3, problem.source.size()));
+    refined = refinement.refine(
+        problem.target, {Eigen::Isometry3f::Identity(), Points::Zero(3, problem.source.size())});
     const Points& points = problem.source.points;
     moved =
         refined.pose * (points + refinement.prior()->displacements(points, refined.coefficients));

@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#pragma once
+
+#include <optional>
+
+#include "unirit/point_cloud.hpp"
+
+namespace unirit {
+
+/// What a target shows of the organ. Lengths in the clouds' unit, half the organ's extent.
+struct Sighting {
+  PointCloud seen;                     ///< the target, with normals: outward, or towards the eye
+  bool whole = false;                  ///< all of the surface, else a part of it from one side
+  std::optional<Eigen::Vector3f> eye;  ///< from where a part is seen
+};
+
+/// Area of the surface that the points sample evenly, in the points' unit squared: what the discs
+/// cover that reach to their 14th nearest points. No outlier that is a minority moves it.
+double sampledArea(const Points& points);
+
+/// Tells a whole surface from a part by its area, over `organ_area` (of sampledArea), and by the
+/// mean of its normals. A part is seen from the target's viewpoint or, where that is not known or
+/// the cloud does not face it, from where its normals point.
+Sighting sightingOf(const PointCloud& target, double organ_area);
+
+/// How sure it is that the eye sees each oriented point, a row in [0, 1]: whether it faces it. Ones
+/// where there is no eye.
+Eigen::RowVectorXf visibility(const PointCloud& oriented,
+                              const std::optional<Eigen::Vector3f>& eye);
+
+}  // namespace unirit

@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include <gtest/gtest.h>
+
+#include "lenient_limits.hpp"
+#include "unirit/evaluation/pair.hpp"
+#include "unirit/registration.hpp"
+#include "unirit/simulation/phantom.hpp"
+
+namespace unirit {
+namespace {
+
+const char* const kOrgans[] = {"liver", "kidney", "spleen"};
+
+RegistrationPair pairOf(const std::string& organ, Protocol protocol) {
+  return makePair(makePhantom(organ, 2, 3000), protocol, 1024, 2);
+}
+
+/// Registers views of one organ, as a stream of them.
+class Stream {
+ public:
+  explicit Stream(const RegistrationPair& pair, int warm_iterations = 8)
+      : organ_{pair.source, pair.source_normals},
+        registrar_(std::make_shared<const Weights>(randomWeights(Pairing::kNearest, 1)),
+                   settings(warm_iterations)) {}
+
+  Registration next(const RegistrationPair& view) { return next(view, nullptr); }
+  Registration next(const RegistrationPair& view, const Registration& before) {
+    const Earlier earlier{before.T_intraoperative_preoperative, before.deformation};
+    return next(view, &earlier);
+  }
+
+ private:
+  Registration next(const RegistrationPair& view, const Earlier* earlier) {
+    return registrar_.registerClouds(organ_, {view.target, {}, view.viewpoint},
+                                     Eigen::Isometry3d::Identity(), earlier);
+  }
+
+  static RegistrationSettings settings(int warm_iterations) {
+    RegistrationSettings settings;
+    settings.stages = {Stage::kRefine};
+    settings.refinement.warm_iterations = warm_iterations;
+    settings.plausibility = test::lenientLimits();
+    return settings;
+  }
+
+  PointCloud organ_;
+  Registrar registrar_;
+};
+
+double errorOf(const Registration& registration, const RegistrationPair& pair) {
+  return rootMeanSquareDistance(registration.deformation->movedSurface(), pair.truth);
+}
+
+/// The view, moved a little as between two images of a camera.
+RegistrationPair nudged(RegistrationPair pair) {
+  const Eigen::Isometry3d motion = Eigen::Translation3d(0.002, -0.001, 0.001) *
+                                   Eigen::AngleAxisd(0.02, Eigen::Vector3d::UnitY());
+  pair.target = moved(motion, pair.target);
+  pair.truth = moved(motion, pair.truth);
+  if (pair.viewpoint) pair.viewpoint = (motion * pair.viewpoint->cast<double>()).cast<float>();
+  return pair;
+}
+
+TEST(WarmStart, IsAsAccurateAsAColdOne) {
+  for (const char* organ : kOrgans) {
+    for (const Protocol protocol : {Protocol::kResampled, Protocol::kPartial}) {
+      const RegistrationPair first = pairOf(organ, protocol), second = nudged(first);
+      Stream stream(first);
+      const Registration before = stream.next(first);
+      const double cold = errorOf(stream.next(second), second);
+      const double warm = errorOf(stream.next(second, before), second);
+      EXPECT_LT(warm, 1.1 * cold) << organ << " " << toString(protocol);
+    }
+  }
+}
+
+TEST(WarmStart, BeginsWhereTheRegistrationBeforeEnded) {
+  const RegistrationPair pair = pairOf("liver", Protocol::kResampled);
+  Stream stream(pair, 1);
+  const Registration before = stream.next(pair);
+  Registration still = before;  // the same pose without its displacement
+  still.deformation = std::make_shared<const Deformation>(before.T_intraoperative_preoperative,
+                                                          pair.source, Points::Zero(3, 1024));
+  const double after = errorOf(stream.next(pair, before), pair);
+  EXPECT_LT(after, 1.2 * errorOf(before, pair));
+  EXPECT_LT(after, errorOf(stream.next(pair, still), pair));
+}
+
+TEST(WarmStart, DoesNotDriftOverOneViewSeenAgainAndAgain) {
+  for (const Protocol protocol : {Protocol::kResampled, Protocol::kPartial}) {
+    const RegistrationPair pair = pairOf("kidney", protocol);
+    Stream stream(pair);
+    Registration last = stream.next(pair);
+    const double first = errorOf(last, pair);
+    for (int i = 0; i < 100; ++i) last = stream.next(pair, last);
+    EXPECT_LT(errorOf(last, pair), 1.2 * first) << toString(protocol);
+  }
+}
+
+TEST(WarmStart, GivesWayToAWholeSearchWhereItFitsPoorly) {
+  const RegistrationPair pair = pairOf("spleen", Protocol::kCaseB);
+  Stream stream(pair, 1);
+  const Registration cold = stream.next(pair);
+  Registration elsewhere = cold;  // a displacement that is none of this organ's
+  elsewhere.deformation = std::make_shared<const Deformation>(Eigen::Isometry3d::Identity(),
+                                                              pair.source, 0.5F * pair.source);
+  EXPECT_LT(errorOf(stream.next(pair, elsewhere), pair), 1.1 * errorOf(cold, pair));
+}
+
+}  // namespace
+}  // namespace unirit
