@@ -31,9 +31,16 @@ void requireStamp(ros::Time stamp) {
   throw Refusal(Status::kInvalidInput, std::string(names::kIntraoperativeCloud) + " has no stamp");
 }
 
-void requireRecent(ros::Time stamp, ros::Time now, double limit) {
+/// The age is noted as a check, whether it passes or not.
+void requireRecent(ros::Time stamp, ros::Time now, double limit, RegistrationResult& result) {
   const double age = (now - stamp).toSec();
-  if (std::abs(age) <= limit) return;
+  Check check;
+  check.name = "age of the cloud [s]";
+  check.value = std::abs(age);
+  check.limit = limit;
+  check.passed = check.value <= limit;
+  result.checks.push_back(check);
+  if (check.passed) return;
   std::ostringstream sentence;
   sentence << names::kIntraoperativeCloud << "'s stamp lies " << std::abs(age) << " s in the "
            << (age > 0.0 ? "past" : "future") << ", the limit (stale_after) is " << limit << " s";
@@ -96,7 +103,7 @@ void Pipeline::applyThresholds(const PlausibilitySettings& thresholds) {
   settings_sha256_ = hash;
 }
 
-void Pipeline::checkMessages(const Job& job, ros::Time now) const {
+void Pipeline::checkMessages(const Job& job, ros::Time now, RegistrationResult& result) const {
   requireCloud(job.preoperative, names::kPreoperativeCloud);
   requireCloud(job.intraoperative, names::kIntraoperativeCloud);
   const std::string& frame = job.preoperative->header.frame_id;
@@ -108,7 +115,7 @@ void Pipeline::checkMessages(const Job& job, ros::Time now) const {
   if (job.detached) return;
   const ros::Time stamp = job.intraoperative->header.stamp;
   requireStamp(stamp);
-  if (!settings_.every_cloud) requireRecent(stamp, now, settings_.stale_after);
+  if (!settings_.every_cloud) requireRecent(stamp, now, settings_.stale_after, result);
 }
 
 /// T_cloud_fixed at the cloud's stamp. A detached job needs it only where it starts from
@@ -136,7 +143,7 @@ std::optional<Eigen::Vector3f> Pipeline::placeSensor(const std_msgs::Header& clo
 }
 
 void Pipeline::attempt(const Job& job, const Attempt* accepted, ros::Time now, Attempt& attempt) {
-  checkMessages(job, now);
+  checkMessages(job, now, attempt.result);
   const std_msgs::Header& header = job.intraoperative->header;
 
   // Messages to clouds

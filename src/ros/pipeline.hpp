@@ -52,7 +52,7 @@ class Pipeline {
   };
 
   void attempt(const Job& job, const Attempt* accepted, ros::Time now, Attempt& attempt);
-  void checkMessages(const Job& job, ros::Time now) const;
+  void checkMessages(const Job& job, ros::Time now, RegistrationResult& result) const;
   Eigen::Isometry3d placeCloud(const Job& job, const std::string& fixed_frame);
   std::optional<Eigen::Vector3f> placeSensor(const std_msgs::Header& cloud) const;
   std::optional<Region> placeRegion(const std_msgs::Header& cloud) const;

@@ -89,6 +89,8 @@ TEST_F(Node, cloudThatFailsACheckIsShownWithValueAndLimit) {
   const auto response = client().registerUntil(
       [](const auto& result) { return result.status == RegistrationResult::INVALID_INPUT; });
   ASSERT_FALSE(response.result.checks.empty());
+  EXPECT_EQ(response.result.checks.front().name, "age of the cloud [s]");
+  EXPECT_TRUE(response.result.checks.front().passed);
   const auto& last = response.result.checks.back();
   EXPECT_EQ(last.name, "largest extent of a cloud over the organ's");
   EXPECT_GT(last.value, last.limit);
