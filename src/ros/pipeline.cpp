@@ -189,7 +189,7 @@ void Pipeline::attempt(const Job& job, const Attempt* accepted, ros::Time now, A
   attempt.deformed =
       toMessage(deformation.movedSurface(),
                 {{names::kDisplacementField, deformation.displacements().colwise().norm()},
-                 {names::kConfidenceField, deformation.confidence(organ.cloud.points)}},
+                 {names::kConfidenceField, deformation.confidence()}},
                 organ, header);
   attempt.rigid = toMessage(deformation.moveRigidly(organ.cloud.points), {}, organ, header);
 }
@@ -209,7 +209,8 @@ Registration Pipeline::registerReady(const PointCloud& organ, const Preprocessed
     return registrar_->registerClouds(organ, ready.cloud,
                                       start.T_cloud_preoperative
                                           ? *start.T_cloud_preoperative
-                                          : alignCentroids(organ, ready.cloud));
+                                          : alignCentroids(organ, ready.cloud),
+                                      start.earlier ? &*start.earlier : nullptr);
   }
   Registration registration;
   registration.status = Status::kInvalidInput;
@@ -226,7 +227,9 @@ Pipeline::Start Pipeline::chooseStart(const Job& job,
             placeGuess(*guess, job.preoperative->header.frame_id, job.intraoperative->header)};
   }
   if (accepted != nullptr) {
-    return {names::kStartAccepted, T_cloud_fixed * accepted->T_fixed_preoperative};
+    const Eigen::Isometry3d T_cloud_preoperative = T_cloud_fixed * accepted->T_fixed_preoperative;
+    return {names::kStartAccepted, T_cloud_preoperative,
+            Earlier{T_cloud_preoperative, accepted->deformation}};
   }
   if (settings_.initial_pose) return {names::kStartPose, T_cloud_fixed * *settings_.initial_pose};
   if (settings_.initial_alignment == "none") {

@@ -49,6 +49,7 @@ class Pipeline {
   struct Start {
     std::string name;
     std::optional<Eigen::Isometry3d> T_cloud_preoperative;  // nothing: from the clouds' centroids
+    std::optional<Earlier> earlier = std::nullopt;          // the accepted registration
   };
 
   void attempt(const Job& job, const Attempt* accepted, ros::Time now, Attempt& attempt);

@@ -18,8 +18,8 @@ constexpr int kFrames = 40;           // of the organ's motion, shown forth and 
 constexpr double kFramePeriod = 0.1;  // of its time between them [s]
 constexpr double kAway = 1.0;         // the camera looks elsewhere [s]
 constexpr double kWarmUp = 3.0;       // the node reads its weights and finds the organ [s]
-// The error may grow by so much, of the mean over a second: views differ in what they show
-constexpr double kDrift = 0.0005;  // [m]
+// The error may grow by so much: other views of the film are registered at the end than before
+constexpr double kDrift = 0.0003;  // [m]
 
 SceneSettings settings() {
   SceneSettings scene;
