@@ -74,9 +74,12 @@ class Refinement::Expectation {
 
   const Correspondences& at(const CoherentState& state, float sigma) {
     attraction_.sigma = sigma;
-    moved_.points = state.pose * (source_.points + state.displacements);
-    moved_.normals = state.pose.linear() * source_.normals;
-    estimator_.estimate(moved_, visibility(moved_, sighting_.eye), attraction_, correspondences_);
+    bent_ = source_.points + state.displacements;
+    moved_.points = state.pose.translation().replicate(1, source_.size());
+    moved_.points.noalias() += state.pose.linear() * bent_;
+    moved_.normals.noalias() = state.pose.linear() * source_.normals;
+    updateVisibility(moved_, sighting_.eye, visibility_);
+    estimator_.estimate(moved_, visibility_, attraction_, correspondences_);
     return correspondences_;
   }
 
@@ -85,7 +88,9 @@ class Refinement::Expectation {
   const Sighting& sighting_;
   Attraction attraction_;
   CorrespondenceEstimator estimator_;
+  Points bent_;
   PointCloud moved_;
+  Eigen::RowVectorXf visibility_;
   Correspondences correspondences_;
 };
 

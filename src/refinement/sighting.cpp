@@ -64,10 +64,20 @@ Sighting sightingOf(const PointCloud& target, double organ_area) {
 
 Eigen::RowVectorXf visibility(const PointCloud& oriented,
                               const std::optional<Eigen::Vector3f>& eye) {
-  if (!eye) return Eigen::RowVectorXf::Ones(oriented.size());
-  const Points rays = ((-oriented.points).colwise() + *eye).colwise().normalized();
-  const Eigen::RowVectorXf cosines = oriented.normals.cwiseProduct(rays).colwise().sum();
-  return ((cosines.array() - kGrazingCosine) / kGrazingRange).max(0.0F).min(1.0F);
+  Eigen::RowVectorXf visibility;
+  updateVisibility(oriented, eye, visibility);
+  return visibility;
+}
+
+void updateVisibility(const PointCloud& oriented, const std::optional<Eigen::Vector3f>& eye,
+                      Eigen::RowVectorXf& visibility) {
+  visibility.setOnes(oriented.size());
+  if (!eye) return;
+  for (Eigen::Index i = 0; i < oriented.size(); ++i) {
+    const Eigen::Vector3f ray = (*eye - oriented.points.col(i)).normalized();
+    const float cosine = oriented.normals.col(i).dot(ray);
+    visibility[i] = std::clamp((cosine - kGrazingCosine) / kGrazingRange, 0.0F, 1.0F);
+  }
 }
 
 }  // namespace unirit

@@ -28,4 +28,8 @@ Sighting sightingOf(const PointCloud& target, double organ_area);
 Eigen::RowVectorXf visibility(const PointCloud& oriented,
                               const std::optional<Eigen::Vector3f>& eye);
 
+/// The same, written over what was known of as many points; allocates nothing then.
+void updateVisibility(const PointCloud& oriented, const std::optional<Eigen::Vector3f>& eye,
+                      Eigen::RowVectorXf& visibility);
+
 }  // namespace unirit
