@@ -137,7 +137,7 @@ struct Registrar::Implementation {
   RefinementQuality qualityOf(const Refined& refined, const Points& target,
                               const Deformation& deformation) const;
   Eigen::Isometry3d toMetres(const Eigen::Isometry3f& pose) const;
-  Eigen::Isometry3f toNetwork(const Eigen::Isometry3d& pose) const;
+  Eigen::Isometry3f startOf(const Eigen::Isometry3d& guess, const Earlier& earlier) const;
   std::shared_ptr<const Deformation> deformationOf(const PointCloud& preoperative,
                                                    const Eigen::Isometry3d& pose,
                                                    const Points& displacements,
@@ -211,7 +211,9 @@ Registration Registrar::Implementation::run(const PointCloud& preoperative,
     if (refined && settings.refinement.correspondence == Correspondence::kSurface) {
       registration.refinement = qualityOf(*refined, target.points, *registration.deformation);
     }
-    applyChecks({checkOverlap(model->sampled.points, target.points,
+    const Eigen::Isometry3f predicted =
+        earlier == nullptr ? Eigen::Isometry3f::Identity() : startOf(guess, *earlier);
+    applyChecks({checkOverlap(predicted * model->sampled.points, target.points,
                               model->extent / model->normalisation.scale, settings.plausibility)},
                 registration);
     applyChecks(checkOutput(registration, guess, model->extent, settings.plausibility),
@@ -260,8 +262,7 @@ Refined Registrar::Implementation::refineFromStart(const PointCloud& target,
   const Points moved = found.move(model->samples) - found.moveRigidly(model->samples);
   const Eigen::Matrix3f to_organ = found.rigidTransform().linear().transpose().cast<float>();
   Refined refined = model->refinement->refine(
-      target, {toNetwork(guess.inverse() * earlier->T_intraoperative_preoperative),
-               to_organ * moved / model->normalisation.scale, true});
+      target, {startOf(guess, *earlier), to_organ * moved / model->normalisation.scale, true});
   if (refined.fit < kPoorFit) keepBetter(afar(), refined);
   return refined;
 }
@@ -283,11 +284,13 @@ Eigen::Isometry3d Registrar::Implementation::toMetres(const Eigen::Isometry3f& p
   return moved;
 }
 
-Eigen::Isometry3f Registrar::Implementation::toNetwork(const Eigen::Isometry3d& pose) const {
+/// The earlier pose from the guess, in the network's unit.
+Eigen::Isometry3f Registrar::Implementation::startOf(const Eigen::Isometry3d& guess,
+                                                     const Earlier& earlier) const {
   const Eigen::Vector3d offset = model->normalisation.offset.cast<double>();
-  Eigen::Isometry3d moved = pose;
-  moved.translation() = (pose * offset - offset) / static_cast<double>(model->normalisation.scale);
-  return moved.cast<float>();
+  Eigen::Isometry3d pose = guess.inverse() * earlier.T_intraoperative_preoperative;
+  pose.translation() = (pose * offset - offset) / static_cast<double>(model->normalisation.scale);
+  return pose.cast<float>();
 }
 
 /// `displacements`: of every point of the organ, in the network's unit, where nothing was refined.

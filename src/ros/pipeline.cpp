@@ -162,17 +162,20 @@ void Pipeline::attempt(const Job& job, const Attempt* accepted, ros::Time now, A
   attempt.result.start = start.name;
 
   // Preprocessing and registration; a cloud that is at fault does not use up the guess
-  RawCloud raw{std::move(seen.cloud), seen.total, placeRegion(header), start.T_cloud_preoperative};
+  RawCloud raw{std::move(seen.cloud), seen.total, placeRegion(header), start.place()};
   started = std::chrono::steady_clock::now();
   const Preprocessed ready = preprocess(std::move(raw), organ.cloud.points, registrar_->settings());
   const double preprocessing = millisecondsSince(started);
   fillIn(ready.stages, attempt.result);
-  Registration registration = registerReady(organ.cloud, ready, start);
+  const Eigen::Isometry3d T_cloud_expected =
+      start.guess ? *start.guess : alignCentroids(organ.cloud, ready.cloud);
+  Registration registration = registerReady(organ.cloud, ready, T_cloud_expected, start.earlier);
   if (registration.status == Status::kInvalidInput && !job.detached) guess_ = guess;
   registration.stages.insert(registration.stages.begin(),
                              {{"conversion", conversion}, {"preprocessing", preprocessing}});
   attempt.T_fixed_preoperative =
       T_cloud_fixed.inverse() * registration.T_intraoperative_preoperative;
+  attempt.T_fixed_expected = T_cloud_fixed.inverse() * T_cloud_expected;
 
   // A guess replaces the accepted pose, so a jump from there is what is wanted
   const PlausibilitySettings& thresholds = registrar_->settings().plausibility;
@@ -204,18 +207,20 @@ std::optional<Region> Pipeline::placeRegion(const std_msgs::Header& cloud) const
 }
 
 Registration Pipeline::registerReady(const PointCloud& organ, const Preprocessed& ready,
-                                     const Start& start) {
+                                     const Eigen::Isometry3d& guess,
+                                     const std::optional<Earlier>& earlier) {
   if (!ready.fault) {
-    return registrar_->registerClouds(organ, ready.cloud,
-                                      start.T_cloud_preoperative
-                                          ? *start.T_cloud_preoperative
-                                          : alignCentroids(organ, ready.cloud),
-                                      start.earlier ? &*start.earlier : nullptr);
+    return registrar_->registerClouds(organ, ready.cloud, guess, earlier ? &*earlier : nullptr);
   }
   Registration registration;
   registration.status = Status::kInvalidInput;
   registration.message = *ready.fault;
   return registration;
+}
+
+std::optional<Eigen::Isometry3d> Pipeline::Start::place() const {
+  if (earlier) return earlier->T_intraoperative_preoperative;
+  return guess;
 }
 
 Pipeline::Start Pipeline::chooseStart(const Job& job,
@@ -227,9 +232,8 @@ Pipeline::Start Pipeline::chooseStart(const Job& job,
             placeGuess(*guess, job.preoperative->header.frame_id, job.intraoperative->header)};
   }
   if (accepted != nullptr) {
-    const Eigen::Isometry3d T_cloud_preoperative = T_cloud_fixed * accepted->T_fixed_preoperative;
-    return {names::kStartAccepted, T_cloud_preoperative,
-            Earlier{T_cloud_preoperative, accepted->deformation}};
+    return {names::kStartAccepted, T_cloud_fixed * accepted->T_fixed_expected,
+            Earlier{T_cloud_fixed * accepted->T_fixed_preoperative, accepted->deformation}};
   }
   if (settings_.initial_pose) return {names::kStartPose, T_cloud_fixed * *settings_.initial_pose};
   if (settings_.initial_alignment == "none") {

