@@ -36,6 +36,8 @@ inline const std::shared_ptr<const Weights>& weights() {
   return random;
 }
 
+inline int threadsOf(const benchmark::State& state) { return static_cast<int>(state.range(0)); }
+
 /// Shows the rate that `multiply_adds` an iteration make.
 inline void setRate(benchmark::State& state, double multiply_adds) {
   state.counters["GFLOP/s"] =

@@ -12,8 +12,6 @@
 namespace unirit::speed {
 namespace {
 
-int threadsOf(const benchmark::State& state) { return static_cast<int>(state.range(0)); }
-
 /// The whole network: 8 rigid iterations, then the displacement of each of the 1024 points.
 void unirit_forward(benchmark::State& state) {
   Network network(weights(), {}, threadsOf(state));
