@@ -52,7 +52,6 @@ CorrespondenceEstimator::CorrespondenceEstimator(const PointCloud& target, const
       target_count_(target.size()),
       padded_((target.size() + kPointBlock - 1) / kPointBlock * kPointBlock),
       targets_(static_cast<std::size_t>(6 * padded_)),
-      nearby_(static_cast<std::size_t>(team.size())),
       target_weights_(static_cast<std::size_t>(padded_)) {
   std::vector<int> order(static_cast<std::size_t>(target_count_));
   std::iota(order.begin(), order.end(), 0);
@@ -71,7 +70,6 @@ CorrespondenceEstimator::CorrespondenceEstimator(const PointCloud& target, const
     const Eigen::Vector3f centre = members.rowwise().mean();
     blocks_.push_back({centre, (members.colwise() - centre).colwise().norm().maxCoeff()});
   }
-  for (Nearby& nearby : nearby_) nearby.blocks.resize(blocks_.size());
   const Points centred = target.points.colwise() - centroid(target.points);
   Eigen::Matrix3f covariance = centred * centred.transpose() / static_cast<float>(target_count_);
   covariance.diagonal().array() += kFlatVariance;
@@ -86,14 +84,20 @@ OrientedPointsView CorrespondenceEstimator::view() const {
           {first + 3 * padded_, first + 4 * padded_, first + 5 * padded_}};
 }
 
-void CorrespondenceEstimator::findNearby(const Eigen::Vector3f& point, float reach,
-                                         Nearby& nearby) const {
-  nearby.count = 0;
+/// Writes the blocks that reach near the point; how many.
+long CorrespondenceEstimator::findNearby(const Eigen::Vector3f& point, float reach,
+                                         int* nearby) const {
+  long count = 0;
   for (std::size_t b = 0; b < blocks_.size(); ++b) {
     const float far = reach + blocks_[b].radius;
-    if ((blocks_[b].centre - point).squaredNorm() > far * far) continue;
-    nearby.blocks[static_cast<std::size_t>(nearby.count++)] = static_cast<int>(b);
+    nearby[count] = static_cast<int>(b);  // written over unless it is near: no branch to guess
+    count += (blocks_[b].centre - point).squaredNorm() > far * far ? 0 : 1;
   }
+  return count;
+}
+
+int* CorrespondenceEstimator::nearbyOf(Eigen::Index source) {
+  return nearby_.data() + static_cast<std::size_t>(source) * blocks_.size();
 }
 
 /// Sums over the source for each target (into the target weights), over the target for each source.
@@ -105,14 +109,16 @@ void CorrespondenceEstimator::sumAffinities(const PointCloud& source, float reac
     chunk_capacity_ = chunks;
   }
   source_sums_.resize(static_cast<std::size_t>(source.size()));
-  team_.forEach(chunks, [&](int thread, long chunk) {
+  nearby_counts_.resize(static_cast<std::size_t>(source.size()));
+  nearby_.resize(nearby_counts_.size() * blocks_.size());
+  team_.forEach(chunks, [&](int, long chunk) {
     float* sums = chunk_sums_.data() + chunk * padded_;
     std::fill_n(sums, padded_, 0.0F);
-    Nearby& nearby = nearby_[static_cast<std::size_t>(thread)];
     for (long i = chunk * kChunk; i < std::min((chunk + 1) * kChunk, source.size()); ++i) {
-      findNearby(source.points.col(i), reach, nearby);
-      source_sums_[static_cast<std::size_t>(i)] = kernels_.affinities(
-          oriented(source, i).data(), view(), nearby.blocks.data(), nearby.count, affinity, sums);
+      const auto point = static_cast<std::size_t>(i);
+      nearby_counts_[point] = findNearby(source.points.col(i), reach, nearbyOf(i));
+      source_sums_[point] = kernels_.affinities(oriented(source, i).data(), view(), nearbyOf(i),
+                                                nearby_counts_[point], affinity, sums);
     }
   });
   Eigen::Map<Eigen::ArrayXf> totals(target_weights_.data(), padded_);
@@ -160,14 +166,13 @@ void CorrespondenceEstimator::estimate(const PointCloud& source,
   correspondences.positions.resize(3, source.size());
   correspondences.normals.resize(3, source.size());
   const long chunks = (source.size() + kChunk - 1) / kChunk;
-  team_.forEach(chunks, [&](int thread, long chunk) {
-    Nearby& nearby = nearby_[static_cast<std::size_t>(thread)];
+  team_.forEach(chunks, [&](int, long chunk) {
     for (long i = chunk * kChunk; i < std::min((chunk + 1) * kChunk, source.size()); ++i) {
-      findNearby(source.points.col(i), reach, nearby);
-      const float source_weight = (1.0F - target_share) * visibility[i] /
-                                  (source_sums_[static_cast<std::size_t>(i)] + source_background);
+      const auto point = static_cast<std::size_t>(i);
+      const float source_weight =
+          (1.0F - target_share) * visibility[i] / (source_sums_[point] + source_background);
       Eigen::Matrix<float, 7, 1> sums;
-      kernels_.gather(oriented(source, i).data(), view(), nearby.blocks.data(), nearby.count,
+      kernels_.gather(oriented(source, i).data(), view(), nearbyOf(i), nearby_counts_[point],
                       affinity, target_weights_.data(), source_weight, sums.data());
       const bool any = sums[0] > 0.0F;
       correspondences.mass[i] = sums[0];

@@ -46,13 +46,9 @@ class CorrespondenceEstimator {
     Eigen::Vector3f centre;
     float radius;
   };
-  /// What one thread writes while it goes through source points.
-  struct Nearby {
-    std::vector<int> blocks;
-    long count = 0;
-  };
 
-  void findNearby(const Eigen::Vector3f& point, float reach, Nearby& nearby) const;
+  long findNearby(const Eigen::Vector3f& point, float reach, int* nearby) const;
+  int* nearbyOf(Eigen::Index source);
   double fit(const Eigen::RowVectorXf& visibility, float target_background,
              float source_background) const;
   void sumAffinities(const PointCloud& source, float reach, const AffinityView& affinity);
@@ -66,8 +62,9 @@ class CorrespondenceEstimator {
   AlignedFloats targets_;  // six rows: x, y, z, normal x, y, z
   float volume_;           // of a box with the target's principal variances
   std::vector<Block> blocks_;
-  std::vector<Nearby> nearby_;  // one a thread
-  AlignedFloats chunk_sums_;    // one row a chunk of source points
+  std::vector<int> nearby_;  // blocks near each source point, one row a point
+  std::vector<long> nearby_counts_;
+  AlignedFloats chunk_sums_;  // one row a chunk of source points
   long chunk_capacity_ = 0;
   AlignedFloats target_weights_;
   std::vector<float> source_sums_;
