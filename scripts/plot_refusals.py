@@ -18,28 +18,24 @@ import sys
 import numpy as np
 
 FALSE_REFUSALS = 0.02  # aimed at with --set-limits
-QUANTILE = 0.998        # of right registrations that keep to one limit of the joint check
-ROOM = 1.25             # of the other limits beyond the farthest right registration
+QUANTILE = 0.998        # of right registrations that keep to a limit
+ROOM = 1.25             # of limits that are not of the joint check beyond that
 FIRST_KIND = ("other organ", "table top", "wrong unit")
 SECOND_KIND = ("far start", "small view", "half other")
 
-TURN = "turn from the start [degree]"  # its limit is how far the start may be off, by design
+# By design: how far a start may be off, how little of an organ may be in view
+DESIGNED = ["turn from the start [degree]", "share in view that is missing", "mean confidence"]
 # Setting of each check whose limit is drawn from registrations
 SETTINGS = {
     "95th percentile of the surface residual over extent": "max_residual_p95",
-    "share in view that is missing": "max_missing",
-    "mean confidence": "min_confidence",
     "surprise of the displacement": "max_surprise",
-    "median surface residual over extent": "max_residual",
-    "share of inliers": "min_inliers",
     "largest displacement over extent": "max_displacement",
     "stretch": "max_stretch",
     "compression": "min_compression",
-    "share folded over": "max_folded",
     "residual over that of the rigid part": "max_residual_left",
     "overlap of the cloud with the predicted region": "min_overlap",
 }
-JOINT = [TURN] + list(SETTINGS)[:4]  # what the joint check is made of
+JOINT = DESIGNED + list(SETTINGS)[:2]  # what the joint check is made of
 JOINT_NAME = "joint closeness to the limits"
 
 
@@ -179,11 +175,10 @@ def draw_limits(data):
     for i, name in enumerate(data.checks):
         if name not in SETTINGS:
             continue
-        values, low = data.values[right, i], data.at_least[i]
-        if name in JOINT:
-            limit = np.quantile(values, 1.0 - QUANTILE if low else QUANTILE)
-        else:
-            limit = values.min() / ROOM if low else values.max() * ROOM
+        low = data.at_least[i]
+        limit = np.quantile(data.values[right, i], 1.0 - QUANTILE if low else QUANTILE)
+        if name not in JOINT:
+            limit *= 1.0 / ROOM if low else ROOM
         data.limits[i] = round_up(limit, low)
     columns = [data.checks.index(name) for name in JOINT]
     joint = data.checks.index(JOINT_NAME)

@@ -59,22 +59,22 @@ struct PlausibilitySettings {
   double max_organ_extent = 1.0;    ///< same, from above [m]
   double min_extent_ratio = 0.1;    ///< extent of the intra-operative cloud over the organ's
   double max_extent_ratio = 3.0;    ///< same, from above
-  double min_overlap = 0.4;         ///< share of the cloud within a tenth of the extent of where
+  double min_overlap = 0.388;       ///< share of the cloud within a tenth of the extent of where
                                     ///< the start has the organ
   double inlier_tolerance = 0.005;  ///< cloud points nearer than this are inliers [m]
   double max_residual = 0.06;       ///< median distance of cloud to moved surface, over extent
-  double max_residual_p95 = 0.125;  ///< same, 95th percentile
+  double max_residual_p95 = 0.126;  ///< same, 95th percentile
   double min_inliers = 0.2;         ///< share of inliers in the cloud
-  double max_residual_left = 1.1;   ///< RefinementQuality::residual_left
-  double max_missing = 0.12;        ///< RefinementQuality::missing
-  double min_confidence = 0.38;     ///< RefinementQuality::confidence
-  double max_surprise = 1.3;        ///< RefinementQuality::surprise
-  double max_displacement = 0.25;   ///< largest non-rigid displacement, over extent
-  double max_stretch = 2.0;         ///< DisplacementStatistics::stretch
-  double min_compression = 0.1;     ///< DisplacementStatistics::compression
-  double max_folded = 0.02;         ///< DisplacementStatistics::folded_fraction
+  double max_residual_left = 1.27;  ///< RefinementQuality::residual_left
+  double max_missing = 0.2;         ///< RefinementQuality::missing
+  double min_confidence = 0.3;      ///< RefinementQuality::confidence
+  double max_surprise = 1.36;       ///< RefinementQuality::surprise
+  double max_displacement = 0.232;  ///< largest non-rigid displacement, over extent
+  double max_stretch = 2.4;         ///< DisplacementStatistics::stretch
+  double min_compression = 0.0628;  ///< DisplacementStatistics::compression
+  double max_folded = 0.05;         ///< DisplacementStatistics::folded_fraction
   double max_turn = 60.0;           ///< of the organ from the start [degree]
-  double max_joint = 0.61;          ///< root mean square of turn, 95th percentile of the residual,
+  double max_joint = 0.541;         ///< root mean square of turn, 95th percentile of the residual,
                                     ///< missing, confidence and surprise, over their limits
   double max_jump_translation = 0.10;  ///< from the last accepted pose, at the organ's centroid [m]
   double max_jump_rotation = 60.0;     ///< from the last accepted pose [degree]
