@@ -2,7 +2,7 @@
 #include "preprocessing/voxel_grid.hpp"
 
 #include <algorithm>
-#include <unordered_map>
+#include <utility>
 
 namespace unirit {
 namespace {
@@ -15,6 +15,45 @@ bool isLess(const Eigen::Vector3f& a, const Eigen::Vector3f& b) {
   return std::lexicographical_compare(a.begin(), a.end(), b.begin(), b.end());
 }
 
+/// Where in a list the voxel of a key stands. Open addressing: a standard map, which allocates each
+/// entry by itself, takes more than twice the time.
+class Places {
+ public:
+  /// `voxels`: all that were added so far, with their keys; where the key is new, its place is the
+  /// end of the list, and the caller appends it.
+  template <class Voxels>
+  std::size_t find(std::int64_t key, const Voxels& voxels) {
+    if (2 * voxels.size() >= places_.size()) grow(voxels);
+    const std::size_t slot = slotOf(key, voxels);
+    if (places_[slot] == kNone) places_[slot] = static_cast<std::uint32_t>(voxels.size());
+    return places_[slot];
+  }
+
+ private:
+  static constexpr std::uint32_t kNone = 0xFFFFFFFF;
+
+  template <class Voxels>
+  std::size_t slotOf(std::int64_t key, const Voxels& voxels) const {
+    constexpr std::uint64_t kGoldenRatio = 0x9E3779B97F4A7C15;  // Fibonacci hashing (Knuth 1973)
+    std::size_t slot = (static_cast<std::uint64_t>(key) * kGoldenRatio) >> 32U;
+    while (true) {
+      slot &= places_.size() - 1;  // a power of two
+      if (places_[slot] == kNone || voxels[places_[slot]].key == key) return slot;
+      ++slot;
+    }
+  }
+
+  template <class Voxels>
+  void grow(const Voxels& voxels) {
+    places_.assign(std::max<std::size_t>(4 * places_.size(), 1U << 14U), kNone);
+    for (std::size_t i = 0; i < voxels.size(); ++i) {
+      places_[slotOf(voxels[i].key, voxels)] = static_cast<std::uint32_t>(i);
+    }
+  }
+
+  std::vector<std::uint32_t> places_;
+};
+
 }  // namespace
 
 bool VoxelGrid::resolves(const Points& points, double edge) {
@@ -23,14 +62,16 @@ bool VoxelGrid::resolves(const Points& points, double edge) {
 
 VoxelGrid::VoxelGrid(const Points& points, double edge) {
   const auto scale = static_cast<float>(1.0 / edge);
-  std::unordered_map<std::int64_t, Voxel> voxels;
+  Places places;
   for (Eigen::Index i = 0; i < points.cols(); ++i) {
     const Eigen::Array3f place = points.col(i).array() * scale;
     const Eigen::Array3f corner = place.floor();
     const auto cell = (corner.cast<std::int64_t>() + kReach).eval();
     const std::int64_t key = cell[2] * kStepZ + cell[1] * kStepY + cell[0];
     const float distance = (place - corner - 0.5F).square().sum();
-    Voxel& voxel = voxels.try_emplace(key, Voxel{key, i, distance}).first->second;
+    const std::size_t found = places.find(key, voxels_);
+    if (found == voxels_.size()) voxels_.push_back({key, i, distance});
+    Voxel& voxel = voxels_[found];
     ++voxel.points;
     if (distance < voxel.distance ||
         (distance == voxel.distance && isLess(points.col(i), points.col(voxel.column)))) {
@@ -38,8 +79,6 @@ VoxelGrid::VoxelGrid(const Points& points, double edge) {
       voxel.distance = distance;
     }
   }
-  voxels_.reserve(voxels.size());
-  for (const auto& entry : voxels) voxels_.push_back(entry.second);
   std::sort(voxels_.begin(), voxels_.end(),
             [](const Voxel& a, const Voxel& b) { return a.key < b.key; });
 }
