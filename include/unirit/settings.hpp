@@ -26,7 +26,7 @@ enum class Correspondence {
 struct PreprocessingSettings {
   double margin = 0.0;  ///< kept around where the organ is expected, over its extent; 0: off
   double voxel = 0.01;  ///< edge of the voxels that keep one point each, over the same; 0: off
-  double min_density = 0.07;  ///< points in and around a voxel over the median voxel's; 0: off
+  double min_density = 0.05;  ///< points in and around a voxel over the median voxel's; 0: off
 };
 
 /// How the clouds are brought to the network.
