@@ -145,6 +145,8 @@ std::vector<PlausibilityCheck> checkOutput(const Registration& registration,
       atMost("turn from the start [degree]", degreesBetween(start, pose), settings.max_turn);
   const auto tail = atMost("95th percentile of the surface residual over extent",
                            residual.p95 / organ_extent, settings.max_residual_p95);
+  const auto bend = atMost("largest displacement over extent", displacement.max / organ_extent,
+                           settings.max_displacement);
   std::vector<PlausibilityCheck> checks{
       PlausibilityCheck{"values that are not finite", finite ? 0.0 : 1.0, 0.0, finite},
       atMost("rotation error", rotationError(pose), kRotationTolerance),
@@ -153,8 +155,7 @@ std::vector<PlausibilityCheck> checkOutput(const Registration& registration,
              settings.max_residual),
       tail,
       atLeast("share of inliers", residual.inlier_fraction, settings.min_inliers),
-      atMost("largest displacement over extent", displacement.max / organ_extent,
-             settings.max_displacement),
+      bend,
       atMost("stretch", displacement.stretch, settings.max_stretch),
       atLeast("compression", displacement.compression, settings.min_compression),
       atMost("share folded over", displacement.folded_fraction, settings.max_folded)};
@@ -167,7 +168,7 @@ std::vector<PlausibilityCheck> checkOutput(const Registration& registration,
       atLeast("mean confidence", quality.confidence, settings.min_confidence),
       atMost("surprise of the displacement", quality.surprise, settings.max_surprise)};
   checks.insert(checks.end(), more.begin(), more.end());
-  checks.push_back(jointly({turn, tail, more[1], more[2], more[3]}, settings.max_joint));
+  checks.push_back(jointly({turn, tail, bend, more[1], more[2], more[3]}, settings.max_joint));
   return checks;
 }
 

@@ -66,16 +66,16 @@ struct PlausibilitySettings {
   double max_residual_p95 = 0.126;  ///< same, 95th percentile
   double min_inliers = 0.2;         ///< share of inliers in the cloud
   double max_residual_left = 1.27;  ///< RefinementQuality::residual_left
-  double max_missing = 0.2;         ///< RefinementQuality::missing
-  double min_confidence = 0.3;      ///< RefinementQuality::confidence
+  double max_missing = 0.15;        ///< RefinementQuality::missing
+  double min_confidence = 0.33;     ///< RefinementQuality::confidence
   double max_surprise = 1.36;       ///< RefinementQuality::surprise
-  double max_displacement = 0.232;  ///< largest non-rigid displacement, over extent
+  double max_displacement = 0.186;  ///< largest non-rigid displacement, over extent
   double max_stretch = 2.4;         ///< DisplacementStatistics::stretch
   double min_compression = 0.0628;  ///< DisplacementStatistics::compression
   double max_folded = 0.05;         ///< DisplacementStatistics::folded_fraction
   double max_turn = 60.0;           ///< of the organ from the start [degree]
-  double max_joint = 0.541;         ///< root mean square of turn, 95th percentile of the residual,
-                                    ///< missing, confidence and surprise, over their limits
+  double max_joint = 0.592;         ///< root mean square of turn, 95th percentile of the residual,
+                                    ///< displacement, missing, confidence and surprise, over limits
   double max_jump_translation = 0.10;  ///< from the last accepted pose, at the organ's centroid [m]
   double max_jump_rotation = 60.0;     ///< from the last accepted pose [degree]
 };
@@ -173,8 +173,10 @@ void visitSettings(Settings& settings, Visitor&& visitor) {
           "share of the organ where the deformation folds, at most");
   visitor("plausibility/max_turn", p.max_turn, 0.0, 180.0,
           "rotation from the start, at most [degree]");
-  visitor("plausibility/max_joint", p.max_joint, 0.0, 10.0,
-          "root mean square of turn, residual, missing, confidence and surprise over their limits");
+  visitor(
+      "plausibility/max_joint", p.max_joint, 0.0, 10.0,
+      "root mean square of turn, residual, displacement, missing, confidence and surprise, each "
+      "over its limit");
   visitor("plausibility/max_jump_translation", p.max_jump_translation, 0.0, 10.0,
           "translation from the last accepted pose at the organ's centroid, at most [m]");
   visitor("plausibility/max_jump_rotation", p.max_jump_rotation, 0.0, 180.0,

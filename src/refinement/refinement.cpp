@@ -30,7 +30,8 @@ constexpr float kSurfaceAcross = 0.2F;  // deviation along the surface, which ge
 constexpr float kPointsAcross = 0.01F;
 constexpr int kPointsPatience = 2;  // times the iterations: points are told apart late
 constexpr float kSurfaceWeight = 0.3F;
-constexpr float kNearby = 0.1F;  // a point without a neighbour within it is not seen
+constexpr float kNearby = 0.1F;           // a point without a neighbour within it is not seen,
+constexpr float kNearbyPoints = 1024.0F;  // of so many; fewer lie farther apart
 
 /// Geometric sequence from `first` to `last` in `steps`.
 float annealed(float first, float last, int step, int steps) {
@@ -158,8 +159,10 @@ Agreement Refinement::agreement(const Points& target, const Refined& refined) co
   const Points bent = source_.points + prior_->displacements(source_.points, refined.coefficients);
   const PointCloud moved{refined.pose * bent, refined.pose.linear() * source_.normals};
   const Eigen::RowVectorXf visible = visibility(moved, refined.eye);
+  const float sparseness = kNearbyPoints / static_cast<float>(target.cols());
+  const float reach = kNearby * std::sqrt(std::max(sparseness, 1.0F));
   const Eigen::RowVectorXf lonely =
-      (nearestDistances(moved.points, target).array() > kNearby).cast<float>();
+      (nearestDistances(moved.points, target).array() > reach).cast<float>();
   const float rigid = nearestDistances(target, refined.pose * source_.points).norm();
   const float left = nearestDistances(target, moved.points).norm();
   return {lonely.dot(visible) / std::max(visible.sum(), 1.0F), rigid > 0.0F ? left / rigid : 1.0F};
