@@ -199,6 +199,7 @@ Registration Registrar::Implementation::run(const PointCloud& preoperative,
 
   timed("assessment", stages, [&] {
     registration.T_intraoperative_preoperative = guess * toMetres(rigid);
+    registration.next_guess = guess * toMetres(beyondExpectation(rigid));
     registration.deformation =
         deformationOf(preoperative, registration.T_intraoperative_preoperative, displacements,
                       guess.linear().cast<float>(), refined);
@@ -211,12 +212,14 @@ Registration Registrar::Implementation::run(const PointCloud& preoperative,
     if (refined && settings.refinement.correspondence == Correspondence::kSurface) {
       registration.refinement = qualityOf(*refined, target.points, *registration.deformation);
     }
+    const Eigen::Isometry3d start =
+        earlier == nullptr ? guess : earlier->T_intraoperative_preoperative;
     const Eigen::Isometry3f predicted =
         earlier == nullptr ? Eigen::Isometry3f::Identity() : startOf(guess, *earlier);
     applyChecks({checkOverlap(predicted * model->sampled.points, target.points,
                               model->extent / model->normalisation.scale, settings.plausibility)},
                 registration);
-    applyChecks(checkOutput(registration, guess, model->extent, settings.plausibility),
+    applyChecks(checkOutput(registration, start, model->extent, settings.plausibility),
                 registration);
   });
   return registration;

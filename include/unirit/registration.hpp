@@ -39,6 +39,9 @@ struct Registration {
   std::string message;  ///< one sentence, names the cause
   /// Rigid part, pre-operative to intra-operative frame; identity unless succeeded or refused.
   Eigen::Isometry3d T_intraoperative_preoperative = Eigen::Isometry3d::Identity();
+  /// The guess for the next view of a stream: this one's, moved by what of the pose lies beyond the
+  /// deviations that are expected of it. Followed further, errors would add up.
+  Eigen::Isometry3d next_guess = Eigen::Isometry3d::Identity();
   std::shared_ptr<const Deformation> deformation;  ///< null unless succeeded or refused
   SurfaceResidual residual;                        ///< moved surface against the cloud
   DisplacementStatistics displacement;             ///< non-rigid part over the organ

@@ -26,10 +26,11 @@ constexpr float kNarrowSigma = 0.06F;        // and ends
 constexpr float kFirstSigma = 0.12F;         // where pose and displacement are sought from afar
 constexpr float kNearSigma = 0.04F;          // and where the search begins near its end
 constexpr float kWholeSharpness = 0.75F;     // last sigma of a whole surface over that of a view
-constexpr float kSurfaceAcross = 0.2F;  // deviation along the surface, which geometry hardly sees
+constexpr float kSurfaceAcross = 0.3F;  // deviation along the surface, which geometry hardly sees
 constexpr float kPointsAcross = 0.01F;
 constexpr int kPointsPatience = 2;  // times the iterations: points are told apart late
-constexpr float kSurfaceWeight = 0.3F;
+constexpr float kSurfaceWeight = 0.4F;
+constexpr float kWholeSymmetry = 1.0F;    // a view needs more, lest it draw the organ together
 constexpr float kNearby = 0.1F;           // a point without a neighbour within it is not seen,
 constexpr float kNearbyPoints = 1024.0F;  // of so many; fewer lie farther apart
 
@@ -55,6 +56,7 @@ double boxSide(const Points& points) {
 Attraction attractionOf(Correspondence correspondence, bool whole) {
   Attraction attraction;
   attraction.normals = whole ? NormalUse::kUnsigned : NormalUse::kSigned;
+  if (whole) attraction.symmetry = kWholeSymmetry;
   if (correspondence == Correspondence::kPoints) {
     attraction.normals = NormalUse::kNone;
     attraction.symmetry = 0.0F;
@@ -63,6 +65,16 @@ Attraction attractionOf(Correspondence correspondence, bool whole) {
 }
 
 }  // namespace
+
+Eigen::Isometry3f beyondExpectation(const Eigen::Isometry3f& pose) {
+  const Eigen::Quaternionf rotation(pose.linear());
+  const float turn = rotation.angularDistance(Eigen::Quaternionf::Identity());
+  const float shift = pose.translation().norm();
+  const float share =
+      std::max({0.0F, 1.0F - kViewPose.rotation / turn, 1.0F - kViewPose.translation / shift});
+  return Eigen::Translation3f(share * pose.translation()) *
+         Eigen::Quaternionf::Identity().slerp(share, rotation);
+}
 
 /// The expectation step of one search, with a sampling of the organ.
 class Refinement::Expectation {
@@ -81,10 +93,23 @@ class Refinement::Expectation {
     moved_.normals.noalias() = state.pose.linear() * source_.normals;
     updateVisibility(moved_, sighting_.eye, visibility_);
     estimator_.estimate(moved_, visibility_, attraction_, correspondences_);
+    turnNormals();
     return correspondences_;
   }
 
  private:
+  /// Halfway to the organ's own normals, as in the symmetric objective of Rusinkiewicz (2019):
+  /// those of the cloud are estimated from a few noisy points.
+  void turnNormals() {
+    for (Eigen::Index i = 0; i < source_.size(); ++i) {
+      auto normal = correspondences_.normals.col(i);
+      const auto own = moved_.normals.col(i);
+      if (normal.isZero()) continue;  // nothing is near
+      normal += std::copysign(1.0F, normal.dot(own)) * own;
+      normal.normalize();
+    }
+  }
+
   const PointCloud& source_;
   const Sighting& sighting_;
   Attraction attraction_;

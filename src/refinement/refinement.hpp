@@ -30,6 +30,9 @@ struct SearchStart {
   bool near = false;          ///< the end is near: the search is short
 };
 
+/// As much of a pose as lies beyond one deviation of the pose that is expected of a view.
+Eigen::Isometry3f beyondExpectation(const Eigen::Isometry3f& pose);
+
 /// How far a refined organ and the cloud agree, beside the likelihood that was sought.
 struct Agreement {
   double missing = 0.0;        ///< RefinementQuality::missing

@@ -167,15 +167,13 @@ void Pipeline::attempt(const Job& job, const Attempt* accepted, ros::Time now, A
   const Preprocessed ready = preprocess(std::move(raw), organ.cloud.points, registrar_->settings());
   const double preprocessing = millisecondsSince(started);
   fillIn(ready.stages, attempt.result);
-  const Eigen::Isometry3d T_cloud_expected =
-      start.guess ? *start.guess : alignCentroids(organ.cloud, ready.cloud);
-  Registration registration = registerReady(organ.cloud, ready, T_cloud_expected, start.earlier);
+  Registration registration = registerReady(organ.cloud, ready, start);
   if (registration.status == Status::kInvalidInput && !job.detached) guess_ = guess;
   registration.stages.insert(registration.stages.begin(),
                              {{"conversion", conversion}, {"preprocessing", preprocessing}});
   attempt.T_fixed_preoperative =
       T_cloud_fixed.inverse() * registration.T_intraoperative_preoperative;
-  attempt.T_fixed_expected = T_cloud_fixed.inverse() * T_cloud_expected;
+  attempt.T_fixed_expected = T_cloud_fixed.inverse() * registration.next_guess;
 
   // A guess replaces the accepted pose, so a jump from there is what is wanted
   const PlausibilitySettings& thresholds = registrar_->settings().plausibility;
@@ -207,10 +205,11 @@ std::optional<Region> Pipeline::placeRegion(const std_msgs::Header& cloud) const
 }
 
 Registration Pipeline::registerReady(const PointCloud& organ, const Preprocessed& ready,
-                                     const Eigen::Isometry3d& guess,
-                                     const std::optional<Earlier>& earlier) {
+                                     const Start& start) {
   if (!ready.fault) {
-    return registrar_->registerClouds(organ, ready.cloud, guess, earlier ? &*earlier : nullptr);
+    return registrar_->registerClouds(
+        organ, ready.cloud, start.guess ? *start.guess : alignCentroids(organ, ready.cloud),
+        start.earlier ? &*start.earlier : nullptr);
   }
   Registration registration;
   registration.status = Status::kInvalidInput;

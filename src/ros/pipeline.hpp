@@ -24,7 +24,7 @@ struct Attempt {
   std::shared_ptr<const Deformation> deformation;  ///< null unless succeeded or refused
   std::string fixed_frame;  ///< what the pose below is in: does not move with the camera
   Eigen::Isometry3d T_fixed_preoperative = Eigen::Isometry3d::Identity();
-  /// Where the pose was expected: the guess that this attempt, or the first of a stream, began with
+  /// Where the next attempt expects it: Registration::next_guess.
   Eigen::Isometry3d T_fixed_expected = Eigen::Isometry3d::Identity();
 };
 
@@ -63,7 +63,7 @@ class Pipeline {
   std::optional<Eigen::Vector3f> placeSensor(const std_msgs::Header& cloud) const;
   std::optional<Region> placeRegion(const std_msgs::Header& cloud) const;
   Registration registerReady(const PointCloud& organ, const Preprocessed& ready,
-                             const Eigen::Isometry3d& guess, const std::optional<Earlier>& earlier);
+                             const Start& start);
   Start chooseStart(const Job& job, const std::optional<geometry_msgs::PoseStamped>& guess,
                     const Attempt* accepted, const Eigen::Isometry3d& T_cloud_fixed) const;
   Eigen::Isometry3d placeGuess(const geometry_msgs::PoseStamped& guess,

@@ -136,6 +136,16 @@ TEST(Refinement, TellsWholeSurfacesFromViewsOfOneSide) {
   }
 }
 
+TEST(BeyondExpectation, IsNothingOfASmallPoseAndNearlyAllOfALargeOne) {
+  const auto pose = [](float turn, float shift) -> Eigen::Isometry3f {
+    return Eigen::Translation3f(shift, 0, 0) * Eigen::AngleAxisf(turn, Eigen::Vector3f::UnitY());
+  };
+  EXPECT_TRUE(beyondExpectation(Eigen::Isometry3f::Identity()).isApprox(pose(0, 0)));
+  EXPECT_TRUE(beyondExpectation(pose(0.03F, 0.02F)).isApprox(pose(0, 0)));
+  EXPECT_TRUE(beyondExpectation(pose(0.7F, 0)).isApprox(pose(0.63F, 0), 1e-3F));
+  EXPECT_TRUE(beyondExpectation(pose(0, 0.35F)).isApprox(pose(0, 0.315F), 1e-3F));
+}
+
 TEST(Refinement, RotatesWithBothClouds) {
   for (const Protocol protocol : {Protocol::kResampled, Protocol::kPartial}) {
     Problem problem(pairOf("liver", protocol, 1));

@@ -24,6 +24,9 @@ class Stream {
                    settings(warm_iterations)) {}
 
   Registration next(const RegistrationPair& view) { return next(view, nullptr); }
+  Registration from(const Eigen::Isometry3d& guess, const RegistrationPair& view) {
+    return registrar_.registerClouds(organ_, {view.target, {}, view.viewpoint}, guess);
+  }
   Registration next(const RegistrationPair& view, const Registration& before) {
     const Earlier earlier{before.T_intraoperative_preoperative, before.deformation};
     return next(view, &earlier);
@@ -95,6 +98,17 @@ TEST(WarmStart, DoesNotDriftOverOneViewSeenAgainAndAgain) {
     for (int i = 0; i < 30; ++i) last = stream.next(pair, last);
     EXPECT_LT(errorOf(last, pair), 1.2 * first) << toString(protocol);
   }
+}
+
+TEST(WarmStart, ExpectsTheNextViewWhereTheGuessWasUnlessThatWasFarOff) {
+  const RegistrationPair pair = pairOf("kidney", Protocol::kPartial);
+  const double half = 0.5 * extent(pair.source);
+  Stream stream(pair);
+  const Eigen::Isometry3d near = Eigen::Isometry3d::Identity();
+  EXPECT_LT((stream.next(pair).next_guess.translation() - near.translation()).norm(), 0.1 * half);
+  const Eigen::Isometry3d far(Eigen::Translation3d(0.3 * half, 0, 0));
+  const Eigen::Isometry3d next = stream.from(far, pair).next_guess;
+  EXPECT_LT(next.translation().norm(), 0.7 * far.translation().norm());
 }
 
 TEST(WarmStart, GivesWayToAWholeSearchWhereItFitsPoorly) {
