@@ -67,14 +67,14 @@ struct PlausibilitySettings {
   double min_inliers = 0.2;         ///< share of inliers in the cloud
   double max_residual_left = 1.28;  ///< RefinementQuality::residual_left
   double max_missing = 0.15;        ///< RefinementQuality::missing
-  double min_confidence = 0.33;     ///< RefinementQuality::confidence
+  double min_confidence = 0.28;     ///< RefinementQuality::confidence
   double max_surprise = 1.37;       ///< RefinementQuality::surprise
   double max_displacement = 0.225;  ///< largest non-rigid displacement, over extent
   double max_stretch = 2.4;         ///< DisplacementStatistics::stretch
   double min_compression = 0.0811;  ///< DisplacementStatistics::compression
   double max_folded = 0.05;         ///< DisplacementStatistics::folded_fraction
   double max_turn = 60.0;           ///< of the organ from the start [degree]
-  double max_joint = 0.596;         ///< root mean square of turn, 95th percentile of the residual,
+  double max_joint = 0.583;         ///< root mean square of turn, 95th percentile of the residual,
                                     ///< displacement, missing, confidence and surprise, over limits
   double max_jump_translation = 0.10;  ///< from the last accepted pose, at the organ's centroid [m]
   double max_jump_rotation = 60.0;     ///< from the last accepted pose [degree]
