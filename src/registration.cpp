@@ -257,8 +257,8 @@ Refined Registrar::Implementation::refineFromStart(const PointCloud& target,
                                                    const Eigen::Isometry3d& guess,
                                                    const Earlier* earlier) {
   const auto afar = [&] {
-    return refineFrom(Eigen::Isometry3f::Identity(), target,
-                      Points::Zero(3, model->sampled.size()));
+    return model->refinement->refine(
+        target, {Eigen::Isometry3f::Identity(), Points::Zero(3, model->sampled.size())});
   };
   if (earlier == nullptr) return afar();
   const Deformation& found = *earlier->deformation;

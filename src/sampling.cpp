@@ -9,7 +9,6 @@
 #include <limits>
 #include <numeric>
 #include <stdexcept>
-#include <tuple>
 
 #include "unirit/random.hpp"
 
@@ -17,12 +16,7 @@ namespace unirit {
 namespace {
 
 constexpr Eigen::Index kDense = 8;  // times the points asked for: thinned first, to save time
-constexpr int kVoxelsAcross = 64;  // of the longest side: about 8,000 voxels on an organ's surface
-
-bool lessByCoordinates(const Points& points, Eigen::Index a, Eigen::Index b) {
-  return std::make_tuple(points(0, a), points(1, a), points(2, a)) <
-         std::make_tuple(points(0, b), points(1, b), points(2, b));
-}
+constexpr int kVoxelsAcross = 64;   // of the longest side: about 8,000 voxels on an organ's surface
 
 /// One point a voxel, the one nearest to its centre: a choice that no order of the points changes.
 std::vector<Eigen::Index> thin(const Points& points) {
@@ -42,7 +36,7 @@ std::vector<Eigen::Index> thin(const Points& points) {
     const auto cell = corner.cast<std::size_t>().eval();
     Voxel& voxel = voxels[(cell[2] * kAcross + cell[1]) * kAcross + cell[0]];
     if (distance < voxel.distance ||
-        (distance == voxel.distance && lessByCoordinates(points, i, voxel.point))) {
+        (distance == voxel.distance && lessByCoordinates(points.col(i), points.col(voxel.point)))) {
       voxel = {distance, i};
     }
   }
@@ -129,6 +123,10 @@ Points select(const Points& points, const std::vector<Eigen::Index>& indices) {
   return selected;
 }
 
+bool lessByCoordinates(const Eigen::Vector3f& a, const Eigen::Vector3f& b) {
+  return std::lexicographical_compare(a.begin(), a.end(), b.begin(), b.end());
+}
+
 std::vector<Eigen::Index> sampleEvenly(const Points& points, Eigen::Index count) {
   if (count < 1) throw std::invalid_argument("count: at least one point must be asked for");
   std::vector<Eigen::Index> candidates(static_cast<std::size_t>(points.cols()));
@@ -138,8 +136,9 @@ std::vector<Eigen::Index> sampleEvenly(const Points& points, Eigen::Index count)
     if (static_cast<Eigen::Index>(thinned.size()) >= count) candidates = std::move(thinned);
   }
   // From here on the sequence is that of the coordinates, whatever the cloud's was.
-  std::sort(candidates.begin(), candidates.end(),
-            [&](Eigen::Index a, Eigen::Index b) { return lessByCoordinates(points, a, b); });
+  std::sort(candidates.begin(), candidates.end(), [&](Eigen::Index a, Eigen::Index b) {
+    return lessByCoordinates(points.col(a), points.col(b));
+  });
   if (static_cast<Eigen::Index>(candidates.size()) <= count) return candidates;
   FarthestPoints farthest(select(points, candidates));
   std::vector<Eigen::Index> chosen(static_cast<std::size_t>(count));

@@ -8,6 +8,10 @@
 
 namespace unirit {
 
+/// Which of two points comes first by x, then y, then z: an order that is the points' own, whatever
+/// that of their cloud.
+bool lessByCoordinates(const Eigen::Vector3f& a, const Eigen::Vector3f& b);
+
 /// At most `count` points spread evenly over the cloud, as columns' indices. Neither the chosen
 /// points nor their sequence depends on the order of the cloud: dense clouds are first thinned to
 /// one point a voxel, then farthest point sampling starts at the point farthest from the centroid.

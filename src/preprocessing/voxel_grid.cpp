@@ -4,16 +4,14 @@
 #include <algorithm>
 #include <utility>
 
+#include "unirit/sampling.hpp"
+
 namespace unirit {
 namespace {
 
 constexpr std::int64_t kReach = 1 << 20;  // voxels from the origin
 constexpr std::int64_t kStepY = std::int64_t{1} << 21;
 constexpr std::int64_t kStepZ = std::int64_t{1} << 42;
-
-bool isLess(const Eigen::Vector3f& a, const Eigen::Vector3f& b) {
-  return std::lexicographical_compare(a.begin(), a.end(), b.begin(), b.end());
-}
 
 /// Where in a list the voxel of a key stands. Open addressing: a standard map, which allocates each
 /// entry by itself, takes more than twice the time.
@@ -73,8 +71,8 @@ VoxelGrid::VoxelGrid(const Points& points, double edge) {
     if (found == voxels_.size()) voxels_.push_back({key, i, distance});
     Voxel& voxel = voxels_[found];
     ++voxel.points;
-    if (distance < voxel.distance ||
-        (distance == voxel.distance && isLess(points.col(i), points.col(voxel.column)))) {
+    if (distance < voxel.distance || (distance == voxel.distance &&
+                                      lessByCoordinates(points.col(i), points.col(voxel.column)))) {
       voxel.column = i;
       voxel.distance = distance;
     }
