@@ -11,7 +11,6 @@ namespace unirit {
 namespace {
 
 constexpr int kFewestCentres = 27;
-constexpr int kMostCentres = 64;
 constexpr int kCandidates = 24;   // per blue-noise centre, the farthest is kept
 constexpr double kPadding = 0.1;  // of the bounding box, on every side
 constexpr double kLowestDeterminant = 0.1;
@@ -23,7 +22,8 @@ Eigen::Matrix3Xd blueNoise(const Points& points, Random& random) {
   const Eigen::Vector3d lowest = points.rowwise().minCoeff().cast<double>();
   const Eigen::Vector3d highest = points.rowwise().maxCoeff().cast<double>();
   const Eigen::Vector3d margin = kPadding * (highest - lowest);
-  const auto count = kFewestCentres + random.below(kMostCentres - kFewestCentres + 1);
+  const auto count =
+      kFewestCentres + random.below(ThinPlateSpline::kMostCentres - kFewestCentres + 1);
   Eigen::Matrix3Xd centres(3, count);
   for (Eigen::Index i = 0; i < count; ++i) {
     double farthest = -1.0;
@@ -40,15 +40,24 @@ Eigen::Matrix3Xd blueNoise(const Points& points, Random& random) {
   return centres;
 }
 
+/// Of the rows.
+template <class Rows>
+Eigen::Array<double, Eigen::Dynamic, 1, 0, ThinPlateSpline::kMostCentres, 1> lengths(
+    const Rows& rows) {
+  return (rows.col(0).array().square() + rows.col(1).array().square() +
+          rows.col(2).array().square())
+      .sqrt();
+}
+
 }  // namespace
 
 Points ThinPlateSpline::displacements(const Points& points) const {
   Points moved(3, points.cols());
   for (Eigen::Index i = 0; i < points.cols(); ++i) {
     const Eigen::Vector3d p = points.col(i).cast<double>();
-    const Eigen::VectorXd kernel = (centres_.colwise() - p).colwise().norm();
-    const Eigen::Vector3d displacement =
-        weights_ * kernel + affine_.leftCols<3>() * p + affine_.col(3);
+    const Centres offsets = centres_.rowwise() - p.transpose();
+    const Eigen::Vector3d displacement = weights_.transpose() * lengths(offsets).matrix() +
+                                         affine_.leftCols<3>() * p + affine_.col(3);
     moved.col(i) = displacement.cast<float>();
   }
   return moved;
@@ -57,14 +66,28 @@ Points ThinPlateSpline::displacements(const Points& points) const {
 Eigen::RowVectorXf ThinPlateSpline::jacobianDeterminants(const Points& points) const {
   Eigen::RowVectorXf determinants(points.cols());
   for (Eigen::Index i = 0; i < points.cols(); ++i) {
-    const Eigen::Vector3d p = points.col(i).cast<double>();
-    Eigen::Matrix3Xd gradients = -(centres_.colwise() - p);  // of |p - c|
-    gradients.array().rowwise() /= gradients.colwise().norm().array().max(1e-12);
-    const Eigen::Matrix3d jacobian =
-        Eigen::Matrix3d::Identity() + affine_.leftCols<3>() + weights_ * gradients.transpose();
-    determinants[i] = static_cast<float>(jacobian.determinant());
+    determinants[i] = static_cast<float>(jacobianDeterminant(points.col(i).cast<double>()));
   }
   return determinants;
+}
+
+double ThinPlateSpline::jacobianDeterminant(const Eigen::Vector3d& p) const {
+  Centres gradients = (-centres_).rowwise() + p.transpose();  // of |p - c|
+  gradients.array().colwise() /= lengths(gradients).max(1e-12);
+  const Eigen::Matrix3d jacobian =
+      Eigen::Matrix3d::Identity() + affine_.leftCols<3>() + weights_.transpose() * gradients;
+  return jacobian.determinant();
+}
+
+/// Looks no further than it takes to tell.
+bool ThinPlateSpline::folds(const Points& points) const {
+  const double allowed = kFoldedShare * static_cast<double>(points.cols());
+  Eigen::Index folded = 0;
+  for (Eigen::Index i = 0; i < points.cols(); ++i) {
+    if (jacobianDeterminant(points.col(i).cast<double>()) >= kLowestDeterminant) continue;
+    if (static_cast<double>(++folded) >= allowed) return true;
+  }
+  return false;
 }
 
 ThinPlateSpline randomDeformation(const Points& points, double rms, std::uint64_t seed) {
@@ -73,13 +96,13 @@ ThinPlateSpline randomDeformation(const Points& points, double rms, std::uint64_
   Random random(seed);
   for (int draw = 0; draw < kMostDraws; ++draw) {
     ThinPlateSpline spline;
-    spline.centres_ = blueNoise(points, random);
-    const Eigen::Index count = spline.centres_.cols();
+    spline.centres_ = blueNoise(points, random).transpose();
+    const Eigen::Index count = spline.centres_.rows();
     Eigen::MatrixXd system = Eigen::MatrixXd::Zero(count + 4, count + 4);
     for (Eigen::Index i = 0; i < count; ++i) {
-      system.row(i).head(count) =
-          (spline.centres_.colwise() - spline.centres_.col(i)).colwise().norm();
-      system.row(i).segment<3>(count) = spline.centres_.col(i).transpose();
+      const Eigen::RowVector3d centre = spline.centres_.row(i);
+      system.row(i).head(count) = lengths(spline.centres_.rowwise() - centre);
+      system.row(i).segment<3>(count) = centre;
       system(i, count + 3) = 1.0;
     }
     system.bottomLeftCorner(4, count) = system.topRightCorner(count, 4).transpose();
@@ -88,17 +111,14 @@ ThinPlateSpline randomDeformation(const Points& points, double rms, std::uint64_
       for (int axis = 0; axis < 3; ++axis) values(i, axis) = random.normal();
     }
     const Eigen::MatrixXd solution = system.partialPivLu().solve(values);
-    spline.weights_ = solution.topRows(count).transpose();
+    spline.weights_ = solution.topRows(count);
     spline.affine_ = solution.bottomRows(4).transpose();
 
     const Points drawn = spline.displacements(points);
     const double scale = rms / std::sqrt(drawn.colwise().squaredNorm().cast<double>().mean());
     spline.weights_ *= scale;
     spline.affine_ *= scale;
-    const auto folded = (spline.jacobianDeterminants(points).array() < kLowestDeterminant).count();
-    if (static_cast<double>(folded) < kFoldedShare * static_cast<double>(points.cols())) {
-      return spline;
-    }
+    if (!spline.folds(points)) return spline;
   }
   throw std::invalid_argument("rms: so strong that every deformation drawn folds");
 }

@@ -12,7 +12,7 @@ namespace unirit::training {
 namespace {
 
 constexpr Eigen::Index kPool = 4096;  // surface points a deformation's pairs are drawn from
-constexpr std::size_t kAhead = 8;     // batches made before they are asked for
+constexpr std::int64_t kAhead = 2;    // batches a thread makes before they are asked for
 
 std::uint64_t mix(std::uint64_t seed, std::uint64_t number) {
   return Random(seed ^ (number * 0xD1B54A32D192ED03ULL)).next();
@@ -50,8 +50,11 @@ Surface vary(Surface surface, const BatchSettings& settings, Random& random) {
 
 View drawView(const BatchSettings& settings, double half_extent, Random& random) {
   View view;
-  view.rotation = settings.rotation;
-  view.translation = settings.translation;
+  view.target = settings.target;
+  if (random.uniform() >= settings.near_share) {
+    view.rotation = settings.rotation;
+    view.translation = settings.translation;
+  }
   if (random.uniform() < settings.partial_share) {
     view.visible_share = random.uniform(0.3, 0.8);
     view.noise = random.uniform(0.0, 0.02) * half_extent;
@@ -119,7 +122,12 @@ Batch makeValidation(const std::vector<Organ>& organs, std::int64_t per_organ, s
 
 BatchQueue::BatchQueue(const std::vector<Organ>& organs, const BatchSettings& settings,
                        std::uint64_t seed, std::int64_t first, int threads)
-    : organs_(organs), settings_(settings), seed_(seed), next_made_(first), next_taken_(first) {
+    : organs_(organs),
+      settings_(settings),
+      seed_(seed),
+      ahead_(kAhead * threads),
+      next_made_(first),
+      next_taken_(first) {
   for (int i = 0; i < threads; ++i) threads_.emplace_back([this] { work(); });
 }
 
@@ -144,9 +152,7 @@ Batch BatchQueue::next() {
 void BatchQueue::work() {
   std::unique_lock lock(mutex_);
   while (true) {
-    changed_.wait(lock, [this] {
-      return stopping_ || next_made_ - next_taken_ < static_cast<std::int64_t>(kAhead);
-    });
+    changed_.wait(lock, [this] { return stopping_ || next_made_ - next_taken_ < ahead_; });
     if (stopping_) return;
     const std::int64_t index = next_made_++;
     lock.unlock();

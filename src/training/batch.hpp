@@ -11,6 +11,7 @@
 #include <thread>
 #include <vector>
 
+#include "unirit/evaluation/pair.hpp"
 #include "unirit/io/organ_folder.hpp"
 
 namespace unirit::training {
@@ -29,7 +30,9 @@ struct BatchSettings {
   std::int64_t pairs = 32;
   std::int64_t points = 256;
   std::int64_t pairs_per_deformation = 4;
+  View::Target target = View::Target::kResampled;
   double partial_share = 0.4;     ///< of pairs, the target being 30 to 80 % of the surface
+  double near_share = 0.0;        ///< of pairs, neither rotated nor translated
   double centred_share = 0.3;     ///< of pairs, the clouds' centroids brought together before
   double rotation = 50.0;         ///< between the clouds, at most [degree]
   double translation = 0.25;      ///< between the clouds, per axis, at most, over the half extent
@@ -61,6 +64,7 @@ class BatchQueue {
   const std::vector<Organ>& organs_;
   const BatchSettings settings_;
   const std::uint64_t seed_;
+  const std::int64_t ahead_;  // batches made before they are asked for
   std::mutex mutex_;
   std::condition_variable changed_;
   std::map<std::int64_t, Batch> ready_;

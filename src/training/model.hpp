@@ -60,11 +60,13 @@ class RigidModuleImpl : public torch::nn::Module {
 };
 TORCH_MODULE(RigidModule);
 
-/// The non-rigid module: displacement of every point of the rigidly moved source.
+/// One iteration of the non-rigid module: displacement of every point of the moved source.
 class NonRigidModuleImpl : public torch::nn::Module {
  public:
   explicit NonRigidModuleImpl(Pairing pairing);
-  torch::Tensor forward(const torch::Tensor& moved_source, const torch::Tensor& target);
+  torch::Tensor encodeTarget(const torch::Tensor& target);
+  torch::Tensor forward(const torch::Tensor& moved_source, const torch::Tensor& target,
+                        const torch::Tensor& target_feature);
 
  private:
   Pairing pairing_;

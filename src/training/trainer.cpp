@@ -45,8 +45,8 @@ int iterationsAt(const TrainingSettings& settings, std::int64_t step) {
   return std::min(settings.iterations, 1 + static_cast<int>(growth * settings.iterations));
 }
 
-/// The paper's L_total; every iteration of the rigid module learns on the detached output of the
-/// one before, so it has seen what it will be given.
+/// The paper's L_total; every iteration of a module learns on the detached output of the one
+/// before, so it has seen what it will be given.
 torch::Tensor totalLoss(Unirit& model, const Batch& batch, const TrainingSettings& settings,
                         std::int64_t step) {
   const double alpha = step < settings.rigid_steps ? 0.0 : settings.alpha;
@@ -62,28 +62,32 @@ torch::Tensor totalLoss(Unirit& model, const Batch& batch, const TrainingSetting
     rigid_loss = rigid_loss / iterations;
   }
   if (alpha == 0.0) return rigid_loss;
-  moved = moved.detach();
-  const auto deformed = moved + model->nonrigid->forward(moved, batch.target);
-  const auto global_loss = distance(settings.loss, deformed, batch.truth, batch.target);
-  return alpha * global_loss + (1.0 - alpha) * rigid_loss;
+  torch::Tensor global_loss = torch::zeros({}, moved.options());
+  const auto target_feature = model->nonrigid->encodeTarget(batch.target);
+  for (int i = 0; i < settings.nonrigid_iterations; ++i) {
+    moved = moved.detach();
+    moved = moved + model->nonrigid->forward(moved, batch.target, target_feature);
+    global_loss = global_loss + distance(settings.loss, moved, batch.truth, batch.target);
+  }
+  return alpha * global_loss / settings.nonrigid_iterations + (1.0 - alpha) * rigid_loss;
 }
 
 /// Sets the gradients of a step and returns its loss. On the CPU the batch is split over threads
 /// that each run forward and backward alone: small layers gain more from that than from threads
 /// inside every operation.
-double accumulateGradients(Unirit& model, const Batch& batch, const TrainingSettings& settings,
-                           std::int64_t step) {
+torch::Tensor accumulateGradients(Unirit& model, const Batch& batch,
+                                  const TrainingSettings& settings, std::int64_t step) {
   const auto parameters = model->parameters();
   const std::int64_t pairs = batch.source.size(0);
   const std::int64_t parts = std::min<std::int64_t>(settings.threads, pairs);
-  std::vector<double> losses(static_cast<std::size_t>(parts));
+  std::vector<torch::Tensor> losses(static_cast<std::size_t>(parts));
   std::vector<torch::autograd::variable_list> gradients(static_cast<std::size_t>(parts));
   const auto work = [&](std::int64_t part) {
     const std::int64_t first = part * pairs / parts, last = (part + 1) * pairs / parts;
     const double share = static_cast<double>(last - first) / static_cast<double>(pairs);
     const auto loss = share * totalLoss(model, slice(batch, first, last), settings, step);
     const auto slot = static_cast<std::size_t>(part);
-    losses[slot] = loss.item<double>();
+    losses[slot] = loss.detach();
     gradients[slot] = torch::autograd::grad({loss}, parameters, {}, {}, false, true);
   };
   std::vector<std::thread> threads;
@@ -91,9 +95,7 @@ double accumulateGradients(Unirit& model, const Batch& batch, const TrainingSett
   work(0);
   for (std::thread& thread : threads) thread.join();
 
-  double loss = 0.0;
   for (std::size_t part = 0; part < gradients.size(); ++part) {
-    loss += losses[part];
     for (std::size_t i = 0; i < parameters.size(); ++i) {
       auto& gradient = gradients[part][i];
       if (!gradient.defined()) continue;  // a module that does not train in this step
@@ -104,7 +106,7 @@ double accumulateGradients(Unirit& model, const Batch& batch, const TrainingSett
       }
     }
   }
-  return loss;
+  return torch::stack(losses).sum();
 }
 
 struct Errors {
@@ -112,21 +114,26 @@ struct Errors {
   double final = 0.0;
 };
 
-Errors validate(Unirit& model, const Batch& all, const torch::Device& device) {
+Errors validate(Unirit& model, const Batch& all, const TrainingSettings& settings) {
   const torch::NoGradGuard no_grad;
   double rigid = 0.0, final = 0.0;
   const std::int64_t count = all.source.size(0);
   for (std::int64_t first = 0; first < count; first += kValidationChunk) {
     const Batch part = transformed(slice(all, first, std::min(first + kValidationChunk, count)),
-                                   [&](const torch::Tensor& t) { return t.to(device); });
-    const auto feature = model->rigid->encodeTarget(part.target);
+                                   [&](const torch::Tensor& t) { return t.to(settings.device); });
     torch::Tensor moved = part.source;
-    for (int i = 0; i < kValidationIterations; ++i) {
-      moved = model->rigid->forward(moved, feature).apply(moved);
+    if (settings.alpha < 1.0) {
+      const auto feature = model->rigid->encodeTarget(part.target);
+      for (int i = 0; i < kValidationIterations; ++i) {
+        moved = model->rigid->forward(moved, feature).apply(moved);
+      }
     }
-    const auto deformed = moved + model->nonrigid->forward(moved, part.target);
     rigid += (rootMeanSquare(moved - part.rigid) * part.scale).sum().item<double>();
-    final += (rootMeanSquare(deformed - part.truth) * part.scale).sum().item<double>();
+    const auto feature = model->nonrigid->encodeTarget(part.target);
+    for (int i = 0; i < settings.nonrigid_iterations; ++i) {
+      moved = moved + model->nonrigid->forward(moved, part.target, feature);
+    }
+    final += (rootMeanSquare(moved - part.truth) * part.scale).sum().item<double>();
   }
   return {rigid / static_cast<double>(count), final / static_cast<double>(count)};
 }
@@ -227,7 +234,7 @@ Unirit train(const std::vector<Organ>& organs, const std::vector<Organ>& validat
   const auto elapsed = [](Clock::time_point from) {
     return std::chrono::duration<double>(Clock::now() - from).count();
   };
-  double loss_sum = 0.0;
+  torch::Tensor loss_sum = torch::zeros({}, settings.device);  // read in reports alone
   std::int64_t since_step = step;
   while (step < settings.steps) {
     for (auto& group : optimiser.param_groups()) {
@@ -249,8 +256,8 @@ Unirit train(const std::vector<Organ>& organs, const std::vector<Organ>& validat
       progress.seconds_left = per_step * static_cast<double>(settings.steps - step);
       progress.pairs_per_second = static_cast<double>(settings.batch.pairs) / per_step;
       progress.learning_rate = learningRate(settings, step - 1);
-      progress.loss = loss_sum / static_cast<double>(step - since_step);
-      const Errors errors = validate(model, held_out, settings.device);
+      progress.loss = loss_sum.item<double>() / static_cast<double>(step - since_step);
+      const Errors errors = validate(model, held_out, settings);
       progress.validation_rigid = errors.rigid;
       progress.validation_final = errors.final;
       curves.append(progress);
@@ -258,7 +265,7 @@ Unirit train(const std::vector<Organ>& organs, const std::vector<Organ>& validat
       if (!std::isfinite(progress.loss)) {
         throw std::runtime_error("training diverged: the loss is not finite");
       }
-      loss_sum = 0.0;
+      loss_sum.zero_();
       since = Clock::now();
       since_step = step;
     }

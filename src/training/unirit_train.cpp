@@ -29,7 +29,9 @@ struct Options {
   int hold_out = 12;
   std::string output;
   std::string start_from;
+  std::string method = "unirit";
   std::string pairing = "nearest";
+  std::string target = "resampled";
   std::string loss = "supervised";
   std::string device = "cpu";
   TrainingSettings training;
@@ -65,7 +67,17 @@ void addOptions(CLI::App& app, Options& options) {
                  "there is resumed")
       ->required();
   app.add_option("--start-from", options.start_from, "Weights file to start from (else He)");
+  app.add_option("--method", options.method,
+                 "unirit, or fpt: the non-rigid module alone, without pairing (Free Point "
+                 "Transformer)")
+      ->check(CLI::IsMember({"unirit", "fpt"}))
+      ->capture_default_str();
   app.add_option("--pairing", options.pairing, "nearest, none or row")->capture_default_str();
+  app.add_option("--target", options.target,
+                 "What the target's points are: resampled on the deformed surface, or paired, the "
+                 "source's own in their order (only to reproduce published tables)")
+      ->check(CLI::IsMember({"resampled", "paired"}))
+      ->capture_default_str();
   app.add_option("--loss", options.loss, "supervised or paper")
       ->check(CLI::IsMember({"supervised", "paper"}))
       ->capture_default_str();
@@ -75,6 +87,10 @@ void addOptions(CLI::App& app, Options& options) {
       ->check(CLI::Range(0.0, 1.0))
       ->capture_default_str();
   app.add_option("--iterations", training.iterations, "Rigid iterations while training")
+      ->check(CLI::Range(1, 32))
+      ->capture_default_str();
+  app.add_option("--nonrigid-iterations", training.nonrigid_iterations,
+                 "Iterations of the non-rigid module")
       ->check(CLI::Range(1, 32))
       ->capture_default_str();
   app.add_option("--steps", training.steps)->check(CLI::PositiveNumber)->capture_default_str();
@@ -90,6 +106,14 @@ void addOptions(CLI::App& app, Options& options) {
       ->capture_default_str();
   app.add_option("--partial-share", batch.partial_share, "Share of pairs seen from one side")
       ->check(CLI::Range(0.0, 1.0))
+      ->capture_default_str();
+  app.add_option("--near-share", batch.near_share,
+                 "Share of pairs with neither rotation nor translation between the clouds")
+      ->check(CLI::Range(0.0, 1.0))
+      ->capture_default_str();
+  app.add_option("--pairs-per-deformation", batch.pairs_per_deformation,
+                 "Views of each deformed organ")
+      ->check(CLI::PositiveNumber)
       ->capture_default_str();
   app.add_option("--rotation", batch.rotation, "Between the clouds, at most [degree]")
       ->check(CLI::Range(0.0, 180.0))
@@ -163,13 +187,21 @@ void printProgress(const Progress& p) {
 
 void run(Options& options) {
   TrainingSettings& training = options.training;
+  if (options.method == "fpt") {
+    options.pairing = "none";
+    training.alpha = 1.0;
+  }
   training.pairing = pairingFromString(options.pairing);
+  if (options.target == "paired") training.batch.target = View::Target::kPaired;
   training.loss = options.loss == "paper" ? Loss::kPaper : Loss::kSupervised;
   training.device = torch::Device(options.device);
   if (training.device.is_cuda() && !torch::cuda::is_available()) {
     throw std::runtime_error("--device cuda: this LibTorch or machine has no CUDA device");
   }
-  if (training.device.is_cuda()) training.threads = 1;
+  if (training.device.is_cuda()) {
+    training.threads = 1;
+    at::globalContext().setAllowTF32CuBLAS(true);  // ten mantissa bits, several times as fast
+  }
   if (training.threads > 1) torch::set_num_threads(1);
   const auto [organs, validation] = split(organsOf(options), options.hold_out);
   std::printf("training on %zu organs, validating on %zu\n", organs.size(), validation.size());

@@ -56,16 +56,19 @@ double difference(const Weights& a, const Weights& b) {
 
 TEST(MaxLinear, HasTheValueAndGradientsOfTheDenseOperation) {
   torch::manual_seed(1);
-  const auto options = torch::requires_grad();
-  const auto values = torch::randn({3, 20, 8}, options), weight = torch::randn({16, 8}, options),
-             bias = torch::randn({16}, options);
-  const auto direction = torch::randn({3, 16});
-  const auto sparse = maxLinear(values, weight, bias);
-  const auto dense = std::get<0>(torch::linear(values, weight, bias).max(1));
-  EXPECT_TRUE(torch::allclose(sparse, dense, 1e-5, 1e-6));
-  const auto a = torch::autograd::grad({(sparse * direction).sum()}, {values, weight, bias});
-  const auto b = torch::autograd::grad({(dense * direction).sum()}, {values, weight, bias});
-  for (std::size_t i = 0; i < a.size(); ++i) EXPECT_TRUE(torch::allclose(a[i], b[i], 1e-4, 1e-5));
+  // in floats by loops, in doubles by whole tensors, as on a graphics processor
+  for (const auto type : {torch::kFloat32, torch::kFloat64}) {
+    const auto options = torch::TensorOptions(type).requires_grad(true);
+    const auto values = torch::randn({3, 20, 8}, options), weight = torch::randn({16, 8}, options),
+               bias = torch::randn({16}, options);
+    const auto direction = torch::randn({3, 16}, type);
+    const auto sparse = maxLinear(values, weight, bias);
+    const auto dense = std::get<0>(torch::linear(values, weight, bias).max(1));
+    EXPECT_TRUE(torch::allclose(sparse, dense, 1e-5, 1e-6));
+    const auto a = torch::autograd::grad({(sparse * direction).sum()}, {values, weight, bias});
+    const auto b = torch::autograd::grad({(dense * direction).sum()}, {values, weight, bias});
+    for (std::size_t i = 0; i < a.size(); ++i) EXPECT_TRUE(torch::allclose(a[i], b[i], 1e-4, 1e-5));
+  }
 }
 
 TEST(Model, WeightsRoundTrip) {
@@ -132,6 +135,34 @@ TEST_F(Training, GoesOnFromItsCheckpointAsIfItHadNotStopped) {
   last_ = {};
   EXPECT_EQ(difference(trained(settings_, folder), whole), 0.0) << "finished: nothing left to do";
   EXPECT_EQ(last_.step, 0);
+}
+
+TEST_F(Training, LearnsOnACudaDeviceWhatItLearnsOnTheCpu) {
+  if (!torch::cuda::is_available()) GTEST_SKIP() << "no CUDA device";
+  trained(settings_, folder_ / "cpu");
+  const double loss = last_.loss;
+  settings_.device = torch::kCUDA;
+  const Weights on_cuda = trained(settings_, folder_ / "cuda");
+  EXPECT_NEAR(last_.loss, loss, 1e-3 * loss);
+  EXPECT_GT(difference(on_cuda, randomWeights(settings_.pairing, 1)), 0.0);
+}
+
+TEST_F(Training, PairedTargetsAreTheTruthRowByRow) {
+  settings_.batch.target = View::Target::kPaired;
+  settings_.batch.partial_share = 0.0;
+  const Batch batch = makeBatch(organs_, settings_.batch, 3, 0);
+  EXPECT_TRUE(torch::allclose(batch.target, batch.truth, 1e-4, 1e-5));
+}
+
+TEST_F(Training, NearPairsAreNotRotated) {
+  settings_.batch.pairs = 16;
+  const auto largestTurn = [&](double near_share) {
+    settings_.batch.near_share = near_share;
+    const Batch batch = makeBatch(organs_, settings_.batch, 4, 0);
+    return (batch.rigid - batch.source).norm(2, 2).max().item<float>();
+  };
+  EXPECT_GT(largestTurn(0.0), 0.5F);
+  EXPECT_LT(largestTurn(1.0), 0.4F);
 }
 
 TEST_F(Training, LeavesTheRigidModuleAloneWhereAlphaIsOneAndTheOtherWhereItIsZero) {

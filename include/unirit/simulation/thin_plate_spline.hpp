@@ -12,6 +12,8 @@ namespace unirit {
 /// random vectors at 27 to 64 blue-noise control points of the padded bounding box.
 class ThinPlateSpline {
  public:
+  static constexpr int kMostCentres = 64;
+
   /// Displacement of each point, 3 x N, same unit as the points it was made for.
   Points displacements(const Points& points) const;
 
@@ -20,8 +22,13 @@ class ThinPlateSpline {
 
  private:
   friend ThinPlateSpline randomDeformation(const Points&, double, std::uint64_t);
-  Eigen::Matrix3Xd centres_;      // 3 x K
-  Eigen::Matrix3Xd weights_;      // 3 x K
+  double jacobianDeterminant(const Eigen::Vector3d& p) const;
+  bool folds(const Points& points) const;
+
+  /// K x 3 with room for the most there can be: one axis a column, for the vector unit.
+  using Centres = Eigen::Matrix<double, Eigen::Dynamic, 3, 0, kMostCentres, 3>;
+  Centres centres_;
+  Centres weights_;
   Eigen::Matrix<double, 3, 4> affine_;  // [linear | constant]
 };
 
