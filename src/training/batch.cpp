@@ -109,12 +109,12 @@ Batch makeBatch(const std::vector<Organ>& organs, const BatchSettings& settings,
   return stack(pairs);
 }
 
-Batch makeValidation(const std::vector<Organ>& organs, std::int64_t per_organ, std::int64_t points,
-                     std::uint64_t seed) {
+Batch makeValidation(const std::vector<Organ>& organs, Protocol protocol, std::int64_t per_organ,
+                     std::int64_t points, std::uint64_t seed) {
   std::vector<RegistrationPair> pairs;
   for (const Organ& organ : organs) {
     for (std::int64_t k = 0; k < per_organ; ++k) {
-      pairs.push_back(makePair(organ.surface, Protocol::kCaseB, points, mix(seed, pairs.size())));
+      pairs.push_back(makePair(organ.surface, protocol, points, mix(seed, pairs.size())));
     }
   }
   return stack(pairs);

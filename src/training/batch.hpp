@@ -45,9 +45,9 @@ struct BatchSettings {
 Batch makeBatch(const std::vector<Organ>& organs, const BatchSettings& settings, std::uint64_t seed,
                 std::int64_t index);
 
-/// Full-view Case B pairs of the given organs, `per_organ` each, for validation.
-Batch makeValidation(const std::vector<Organ>& organs, std::int64_t per_organ, std::int64_t points,
-                     std::uint64_t seed);
+/// Pairs of the given organs under a protocol, `per_organ` each, for validation.
+Batch makeValidation(const std::vector<Organ>& organs, Protocol protocol, std::int64_t per_organ,
+                     std::int64_t points, std::uint64_t seed);
 
 /// Makes batches ahead of the trainer, in order, on its own threads.
 class BatchQueue {

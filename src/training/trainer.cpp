@@ -109,12 +109,27 @@ torch::Tensor accumulateGradients(Unirit& model, const Batch& batch,
   return torch::stack(losses).sum();
 }
 
-struct Errors {
-  double rigid = 0.0;
-  double final = 0.0;
+struct ValidationSet {
+  Protocol protocol;
+  Batch pairs;
 };
 
-Errors validate(Unirit& model, const Batch& all, const TrainingSettings& settings) {
+std::vector<ValidationSet> validationSets(const std::vector<Organ>& organs,
+                                          const TrainingSettings& settings) {
+  std::vector<Protocol> protocols{Protocol::kCaseB, Protocol::kResampled, Protocol::kPartial,
+                                  Protocol::kIntraop};
+  if (settings.batch.target == View::Target::kPaired) protocols = {Protocol::kPaired};
+  std::vector<ValidationSet> sets;
+  for (const Protocol protocol : protocols) {
+    sets.push_back({protocol, makeValidation(organs, protocol, kValidationPairs, kValidationPoints,
+                                             settings.seed)});
+  }
+  return sets;
+}
+
+ValidationErrors validate(Unirit& model, const ValidationSet& set,
+                          const TrainingSettings& settings) {
+  const Batch& all = set.pairs;
   const torch::NoGradGuard no_grad;
   double rigid = 0.0, final = 0.0;
   const std::int64_t count = all.source.size(0);
@@ -135,7 +150,7 @@ Errors validate(Unirit& model, const Batch& all, const TrainingSettings& setting
     }
     final += (rootMeanSquare(moved - part.truth) * part.scale).sum().item<double>();
   }
-  return {rigid / static_cast<double>(count), final / static_cast<double>(count)};
+  return {set.protocol, rigid / static_cast<double>(count), final / static_cast<double>(count)};
 }
 
 double learningRate(const TrainingSettings& settings, std::int64_t step) {
@@ -192,19 +207,27 @@ class Checkpoint {
 
 class Curves {
  public:
-  Curves(const std::filesystem::path& path, bool resumed)
+  Curves(const std::filesystem::path& path, bool resumed,
+         const std::vector<ValidationSet>& validation)
       : file_(path, resumed ? std::ios::app : std::ios::trunc) {
     if (!file_) throw std::runtime_error(path.string() + ": cannot be written");
     if (!resumed) {
-      file_ << "step,seconds,pairs_per_second,learning_rate,loss,validation_rigid_mm,"
-               "validation_final_mm\n";
+      file_ << "step,seconds,pairs_per_second,learning_rate,loss";
+      for (const ValidationSet& set : validation) {
+        file_ << ',' << toString(set.protocol) << "_rigid_mm," << toString(set.protocol)
+              << "_final_mm";
+      }
+      file_ << std::endl;
     }
   }
 
   void append(const Progress& p) {
     file_ << p.step << ',' << p.seconds << ',' << p.pairs_per_second << ',' << p.learning_rate
-          << ',' << p.loss << ',' << 1000.0 * p.validation_rigid << ','
-          << 1000.0 * p.validation_final << std::endl;
+          << ',' << p.loss;
+    for (const ValidationErrors& errors : p.validation) {
+      file_ << ',' << 1000.0 * errors.rigid << ',' << 1000.0 * errors.final;
+    }
+    file_ << std::endl;
   }
 
  private:
@@ -223,9 +246,8 @@ Unirit train(const std::vector<Organ>& organs, const std::vector<Organ>& validat
   std::int64_t step = 0;
   double seconds_before = 0.0;
   const bool resumed = checkpoint.load(model, optimiser, step, seconds_before);
-  Curves curves(folder / "curves.csv", resumed);
-  const Batch held_out =
-      makeValidation(validation, kValidationPairs, kValidationPoints, settings.seed);
+  const auto validation_sets = validationSets(validation, settings);
+  Curves curves(folder / "curves.csv", resumed, validation_sets);
   BatchQueue queue(organs, settings.batch, settings.seed, step, settings.data_threads);
 
   using Clock = std::chrono::steady_clock;
@@ -257,9 +279,9 @@ Unirit train(const std::vector<Organ>& organs, const std::vector<Organ>& validat
       progress.pairs_per_second = static_cast<double>(settings.batch.pairs) / per_step;
       progress.learning_rate = learningRate(settings, step - 1);
       progress.loss = loss_sum.item<double>() / static_cast<double>(step - since_step);
-      const Errors errors = validate(model, held_out, settings);
-      progress.validation_rigid = errors.rigid;
-      progress.validation_final = errors.final;
+      for (const ValidationSet& set : validation_sets) {
+        progress.validation.push_back(validate(model, set, settings));
+      }
       curves.append(progress);
       report(progress);
       if (!std::isfinite(progress.loss)) {

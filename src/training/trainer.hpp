@@ -34,7 +34,14 @@ struct TrainingSettings {
   torch::Device device = torch::kCPU;
 };
 
-/// What a line of the curves says; lengths in metres, averaged over pairs.
+/// Errors on the pairs of a protocol, averaged over pairs.
+struct ValidationErrors {
+  Protocol protocol = Protocol::kCaseB;
+  double rigid = 0.0;  ///< rigid module's output to the best rigid fit, RMS [m]
+  double final = 0.0;  ///< whole network's output to the truth, RMS [m]
+};
+
+/// What a line of the curves says.
 struct Progress {
   std::int64_t step = 0;
   std::int64_t steps = 0;
@@ -42,14 +49,15 @@ struct Progress {
   double seconds_left = 0.0;  ///< at the present speed
   double pairs_per_second = 0.0;
   double learning_rate = 0.0;
-  double loss = 0.0;              ///< the network's unit
-  double validation_rigid = 0.0;  ///< rigid module's output to the best rigid fit, RMS [m]
-  double validation_final = 0.0;  ///< whole network's output to the truth, RMS [m]
+  double loss = 0.0;  ///< the network's unit
+  std::vector<ValidationErrors> validation;
 };
 
-/// Trains on `organs`, validates on `validation` (Case B). Saves network, optimiser and step to
-/// `folder`/checkpoint.pt and goes on from there if it exists; curves go to `folder`/curves.csv.
-/// Throws std::runtime_error where the folder cannot be written or the checkpoint does not fit.
+/// Trains on `organs`; validates on `validation` under `caseb`, `resampled`, `partial` and
+/// `intraop`, or under `paired` where the targets in training are. Saves network, optimiser and
+/// step to `folder`/checkpoint.pt and goes on from there if it exists; curves go to
+/// `folder`/curves.csv. Throws std::runtime_error where the folder cannot be written or the
+/// checkpoint does not fit.
 Unirit train(const std::vector<Organ>& organs, const std::vector<Organ>& validation,
              const TrainingSettings& settings, const std::filesystem::path& folder, Unirit model,
              const std::function<void(const Progress&)>& report);

@@ -12,6 +12,7 @@
 
 #include "trainer.hpp"
 #include "unirit/io/organ_folder.hpp"
+#include "unirit/simulation/anatomical_variation.hpp"
 #include "unirit/simulation/phantom.hpp"
 
 namespace {
@@ -27,6 +28,7 @@ struct Options {
   std::vector<std::string> exclude{"small_bowel"};
   int phantoms = 0;
   int hold_out = 12;
+  int variations = 0;
   std::string output;
   std::string start_from;
   std::string method = "unirit";
@@ -59,6 +61,11 @@ void addOptions(CLI::App& app, Options& options) {
       ->capture_default_str();
   app.add_option("--phantoms", options.phantoms, "Digital phantoms of each organ to train on too")
       ->check(CLI::Range(0, 10000));
+  app.add_option("--variations", options.variations,
+                 "Classes of fewer organs are filled up to this many with varied anatomies of "
+                 "theirs")
+      ->check(CLI::Range(0, 10000))
+      ->capture_default_str();
   app.add_option("--hold-out", options.hold_out, "Every n-th organ of a class validates")
       ->check(CLI::Range(2, 1000000))
       ->capture_default_str();
@@ -176,12 +183,28 @@ std::pair<std::vector<Organ>, std::vector<Organ>> split(std::vector<Organ> organ
   return {std::move(kept), std::move(held_out)};
 }
 
+/// Varied anatomies of a class's organs in turn, up to `least` organs a class.
+void addVariations(std::vector<Organ>& organs, int least, std::uint64_t seed) {
+  std::map<std::string, std::vector<Organ>> classes;
+  for (const Organ& organ : organs) classes[organ.name].push_back(organ);
+  for (const auto& [name, originals] : classes) {
+    for (auto i = originals.size(); i < static_cast<std::size_t>(least); ++i) {
+      const Organ& original = originals[i % originals.size()];
+      organs.push_back({name, original.subject + " variation " + std::to_string(i),
+                        varyAnatomy(original.surface, seed + i)});
+    }
+  }
+}
+
 void printProgress(const Progress& p) {
-  std::printf(
-      "step %ld/%ld  loss %.4f  validation: rigid %.2f mm, final %.2f mm  "
-      "%.1f pairs/s  lr %.1e  %.0f s, %.0f s left\n",
-      static_cast<long>(p.step), static_cast<long>(p.steps), p.loss, 1000.0 * p.validation_rigid,
-      1000.0 * p.validation_final, p.pairs_per_second, p.learning_rate, p.seconds, p.seconds_left);
+  std::printf("step %ld/%ld  loss %.4f ", static_cast<long>(p.step), static_cast<long>(p.steps),
+              p.loss);
+  for (const ValidationErrors& errors : p.validation) {
+    std::printf(" %s %.1f, %.1f mm ", toString(errors.protocol), 1000.0 * errors.rigid,
+                1000.0 * errors.final);
+  }
+  std::printf(" %.0f pairs/s  lr %.1e  %.0f s, %.0f s left\n", p.pairs_per_second, p.learning_rate,
+              p.seconds, p.seconds_left);
   std::fflush(stdout);
 }
 
@@ -203,8 +226,11 @@ void run(Options& options) {
     at::globalContext().setAllowTF32CuBLAS(true);  // ten mantissa bits, several times as fast
   }
   if (training.threads > 1) torch::set_num_threads(1);
-  const auto [organs, validation] = split(organsOf(options), options.hold_out);
+  auto [organs, validation] = split(organsOf(options), options.hold_out);
+  addVariations(organs, options.variations, training.seed);
   std::printf("training on %zu organs, validating on %zu\n", organs.size(), validation.size());
+  std::printf(
+      "of every validation protocol: rigid stage to the best rigid fit, final to the truth\n");
 
   Unirit model(training.pairing);
   model->setWeights(options.start_from.empty()
@@ -221,8 +247,11 @@ void run(Options& options) {
   weights.metadata["training_organs"] = std::to_string(organs.size());
   weights.metadata["training_seed"] = std::to_string(training.seed);
   weights.metadata["loss"] = options.loss;
-  weights.metadata["validation_rigid_mm"] = std::to_string(1000.0 * last.validation_rigid);
-  weights.metadata["validation_final_mm"] = std::to_string(1000.0 * last.validation_final);
+  for (const ValidationErrors& errors : last.validation) {
+    const std::string name = std::string("validation_") + toString(errors.protocol);
+    weights.metadata[name + "_rigid_mm"] = std::to_string(1000.0 * errors.rigid);
+    weights.metadata[name + "_final_mm"] = std::to_string(1000.0 * errors.final);
+  }
   const std::filesystem::path path = std::filesystem::path(options.output) / "unirit.safetensors";
   writeWeights(weights, path);
   std::printf("wrote %s\n", path.c_str());
