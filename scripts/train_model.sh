@@ -1,18 +1,20 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
-# Usage: train_model.sh ORGANS OUTPUT
+# Usage: train_model.sh ORGANS OUTPUT [cpu|cuda]
 # Makes the shipped weights again: trains on ORGANS/ORGAN/*.ply (millimetres) and on digital
 # phantoms, and leaves checkpoint, curves and unirit.safetensors in OUTPUT. Run again, it goes on
-# where it was stopped.
+# where it was stopped. With cuda (a LibTorch that has it, see src/training/CMakeLists.txt) it takes
+# minutes, else a day and more.
 set -euo pipefail
-if (($# != 2)) || [[ ! -d $1 ]]; then
-  echo "usage: train_model.sh ORGANS OUTPUT; ORGANS is a folder of ORGAN/*.ply" >&2
+if (($# < 2 || $# > 3)) || [[ ! -d $1 ]]; then
+  echo "usage: train_model.sh ORGANS OUTPUT [cpu|cuda]; ORGANS is a folder of ORGAN/*.ply" >&2
   exit 2
 fi
-organs=$(realpath "$1") output=$(realpath -m "$2")
-"$(dirname "${BASH_SOURCE[0]}")/build.sh"
+organs=$(realpath "$1") output=$(realpath -m "$2") device=${3:-cpu}
+"$(dirname "${BASH_SOURCE[0]}")/build.sh" unirit_train
 source "$(dirname "${BASH_SOURCE[0]}")/setup.sh"
 
-exec "$root/build/devel/lib/unirit/unirit_train" --data "$organs" --phantoms 6 --output "$output" \
-  --steps 7000 --rigid-steps 4000 --alpha 0.5 --batch 32 --points 256 --threads 2 --seed 1 \
-  --report-every 250 --save-every 250
+exec "$root/build/devel/lib/unirit/unirit_train" --data "$organs" --phantoms 6 --hold-out 24 \
+  --output "$output" --device "$device" --data-threads "$(nproc)" --steps 6600 --rigid-steps 1500 \
+  --batch 384 --points 512 --near-share 0.3 --pairs-per-deformation 16 --seed 1 \
+  --report-every 500 --save-every 500

@@ -313,6 +313,11 @@ std::shared_ptr<const Deformation> Registrar::Implementation::deformationOf(
 
 Registrar::Registrar(std::shared_ptr<const Weights> weights, const RegistrationSettings& settings) {
   validate(settings);
+  if (weights && weights->pairing == Pairing::kRow) {
+    throw std::invalid_argument(
+        "weights: their pairing is row, and the rows of two clouds of a patient have nothing in "
+        "common; such weights serve only the benchmark");
+  }
   implementation_ = std::make_unique<Implementation>(std::move(weights), settings);
 }
 

@@ -60,4 +60,21 @@ MethodResult Unirit::registerPair(const RegistrationPair& pair) {
           registration.T_intraoperative_preoperative};
 }
 
+UniritByRows::UniritByRows(std::shared_ptr<const Weights> weights)
+    : network_(weights, {NetworkSettings().rigid_iterations, 1, Pairing::kRow}, 1) {}
+
+std::string UniritByRows::parameters() const { return "weights=" + network_.weights().sha256; }
+
+MethodResult UniritByRows::registerPair(const RegistrationPair& pair) {
+  const Normalisation unit = Normalisation::of(pair.source);
+  const Points source = unit.apply(pair.source), target = unit.apply(pair.target);
+  const Eigen::Isometry3f pose = network_.estimateRigid(source, target);
+  const Points moved = pose * source;
+  const Points deformed = moved + network_.estimateDisplacements(moved, target, moved);
+  const auto toMetres = [&](const Points& points) -> Points {
+    return (points * unit.scale).colwise() + unit.offset;
+  };
+  return {false, toMetres(deformed), toMetres(pose * unit.apply(pair.interior)), std::nullopt};
+}
+
 }  // namespace unirit

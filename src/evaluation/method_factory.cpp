@@ -100,14 +100,16 @@ std::unique_ptr<RegistrationMethod> MethodFactory::make(const std::string& descr
                                                         Protocol protocol) {
   Values values;
   const std::string name = parse(description, values);
-  std::unique_ptr<RegistrationMethod> method =
-      name == "unirit"
-          ? makeUnirit(weights(takeText(values, "weights", default_weights_)), values, protocol)
-          : makeRival(name, values, protocol);
+  std::unique_ptr<RegistrationMethod> method = makeRival(name, values, protocol);
+  if (name == "unirit" || name == "unirit-rows") {
+    auto chosen = weights(takeText(values, "weights", default_weights_));
+    method = name == "unirit" ? makeUnirit(std::move(chosen), values, protocol)
+                              : std::make_unique<UniritByRows>(std::move(chosen));
+  }
   if (!method) {
     throw std::invalid_argument("method '" + description +
                                 "': unknown, known are identity, best-rigid, icp, gicp, "
-                                "cpd-rigid, cpd, bcpd, unirit");
+                                "cpd-rigid, cpd, bcpd, unirit, unirit-rows");
   }
   if (!values.empty()) {
     throw std::invalid_argument("method '" + description + "': unknown key '" +

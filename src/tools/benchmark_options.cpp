@@ -44,7 +44,7 @@ void addDataOptions(CLI::App& app, BenchmarkOptions& options) {
 void addMethodOptions(CLI::App& app, BenchmarkOptions& options) {
   app.add_option("--methods", options.methods,
                  "[LABEL@]NAME[:KEY=VALUE]...; names: identity, best-rigid, icp, gicp, cpd-rigid, "
-                 "cpd, bcpd, unirit; unirit's keys: weights=FILE, stages=rigid+nonrigid, "
+                 "cpd, bcpd, unirit, unirit-rows; unirit's keys: weights=FILE, stages=rigid+nonrigid, "
                  "start=centroids; a rival's keys replace its tuned settings")
       ->delimiter(',')
       ->capture_default_str();

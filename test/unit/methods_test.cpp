@@ -90,5 +90,24 @@ TEST(Methods, UniritIsToldByItsStagesAndWeights) {
   std::filesystem::remove(path);
 }
 
+TEST(Methods, RowsAreReadByUniritRowsAlone) {
+  const std::string path =
+      (std::filesystem::temp_directory_path() / "methods_rows_test.safetensors").string();
+  MethodFactory factory(path);
+  writeWeights(randomWeights(Pairing::kRow, 1), path);
+  RegistrationPair pair = turnedOrgan();
+  pair.target = pair.truth;
+  const auto rows = factory.make("unirit-rows", Protocol::kPaired);
+  const Points in_order = rows->registerPair(pair).source;
+  pair.target = test::shuffled(pair.target, 3);
+  EXPECT_NE(rows->registerPair(pair).source, in_order);
+  EXPECT_THROW(factory.make("unirit", Protocol::kPaired), std::invalid_argument);
+  EXPECT_THROW(factory.make("unirit-rows:stages=rigid", Protocol::kPaired), std::invalid_argument);
+
+  writeWeights(randomWeights(Pairing::kNearest, 1), path);
+  EXPECT_THROW(MethodFactory(path).make("unirit-rows", Protocol::kPaired), std::invalid_argument);
+  std::filesystem::remove(path);
+}
+
 }  // namespace
 }  // namespace unirit

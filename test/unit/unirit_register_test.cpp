@@ -385,6 +385,8 @@ TEST_F(RegisterTool, MisuseIsOneSentenceAndNothingWritten) {
   expectRefusal("organ.ply seen.ply --units m" + output, "read as metres");
   expectRefusal("organ.ply seen.ply --output out --weights missing.safetensors", "missing");
   expectRefusal("organ.ply seen.ply --output out --weights broken.safetensors", "broken");
+  writeWeights(randomWeights(Pairing::kRow, 1), at("rows.safetensors"));
+  expectRefusal("organ.ply seen.ply --output out --weights rows.safetensors", "row");
   expectRefusal("organ.ply seen.ply --settings wrong.yaml" + output, "sampling/point is not");
   expectRefusal("organ.ply seen.ply --settings missing.yaml" + output, "missing.yaml");
   expectRefusal("organ.ply seen.ply --weights weights.safetensors --output organ.ply", "--output");

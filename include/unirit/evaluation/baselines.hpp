@@ -5,6 +5,7 @@
 #include <string>
 
 #include "unirit/evaluation/method.hpp"
+#include "unirit/network/network.hpp"
 #include "unirit/registration.hpp"
 
 namespace unirit {
@@ -42,6 +43,21 @@ class Unirit : public RegistrationMethod {
   std::string weights_hash_;
   bool align_centroids_;
   Registrar registrar_;
+};
+
+/// The network as published, which reads row i of the target beside row i of the source: only to
+/// reproduce the published tables, whose pairs share their rows. Interior points move rigidly.
+class UniritByRows : public RegistrationMethod {
+ public:
+  /// Throws std::invalid_argument where the weights' pairing is not row.
+  explicit UniritByRows(std::shared_ptr<const Weights> weights);
+
+  std::string name() const override { return "unirit-rows"; }
+  std::string parameters() const override;
+  MethodResult registerPair(const RegistrationPair& pair) override;
+
+ private:
+  Network network_;
 };
 
 /// What a rigid transform makes of a pair.
