@@ -9,6 +9,7 @@
 
 #include "unirit/io/organ_names.hpp"
 #include "unirit/io/surface_io.hpp"
+#include "unirit/normals.hpp"
 
 namespace unirit {
 namespace {
@@ -40,9 +41,11 @@ std::vector<OrganFile> listOrganFiles(const std::string& folder,
   const fs::path root = fs::path(folder).lexically_normal();
   if (!fs::is_directory(root)) throw std::runtime_error(folder + ": not a folder");
   std::vector<fs::path> paths;
-  for (const auto& entry : fs::recursive_directory_iterator(root)) {
+  const auto links_too = fs::directory_options::follow_directory_symlink;
+  for (const auto& entry : fs::recursive_directory_iterator(root, links_too)) {
     const bool hidden = entry.path().filename().string().front() == '.';
-    if (entry.is_regular_file() && !hidden) paths.push_back(entry.path());
+    const bool file = entry.is_regular_file() || !entry.exists();  // a link that leads nowhere, too
+    if (file && !hidden) paths.push_back(entry.path());
   }
   std::sort(paths.begin(), paths.end());
 
@@ -68,6 +71,7 @@ std::vector<OrganFile> listOrganFiles(const std::string& folder,
 Surface readOrganSurface(const OrganFile& file, double unit) {
   Surface surface = readSurface(file.path, unit).surface;
   if (surface.faces.cols() == 0) throw std::runtime_error(file.path + ": has no faces");
+  turnFacesOutwards(surface);
   return surface;
 }
 

@@ -90,5 +90,26 @@ TEST_F(OrganFolders, KeepReadingAfterABadFile) {
   EXPECT_THROW(list((root_ / "none").string()), std::runtime_error);
 }
 
+TEST_F(OrganFolders, MayBeLinksAndTellThoseThatLeadNowhere) {
+  touch("elsewhere/a.ply");
+  fs::create_directories(root_ / "organs");
+  fs::create_directory_symlink(root_ / "elsewhere", root_ / "organs/liver");
+  fs::create_symlink("nowhere.ply", root_ / "organs/x_spleen.ply");
+  EXPECT_EQ(list((root_ / "organs").string()), "liver:a spleen:x_spleen ");
+  const OrganFile leads_nowhere{"spleen", "x", (root_ / "organs/x_spleen.ply").string(), "x"};
+  EXPECT_THROW(readOrganSurface(leads_nowhere, 0.001), std::runtime_error);
+}
+
+TEST_F(OrganFolders, HoldSurfacesWhoseFacesLookOutwards) {
+  const Surface outwards = test::box({0.1F, 0.1F, 0.1F});
+  Surface inwards = outwards;
+  inwards.faces.row(1).swap(inwards.faces.row(2));
+  for (const Surface& box : {outwards, inwards}) {
+    const std::string path = (root_ / "box.ply").string();
+    writePly(box, path, 0.001);
+    EXPECT_EQ(readOrganSurface({"box", "box", path, "box.ply"}, 0.001).faces, outwards.faces);
+  }
+}
+
 }  // namespace
 }  // namespace unirit

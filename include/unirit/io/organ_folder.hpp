@@ -33,8 +33,9 @@ struct OrganFile {
 std::vector<OrganFile> listOrganFiles(const std::string& folder,
                                       const std::function<void(const std::string&)>& left_out);
 
-/// The surface of the file. `unit`: the file's, in metres. Throws std::runtime_error with a
-/// sentence that names the file where it cannot be read or has no faces.
+/// The surface of the file, turned where its faces look inwards. `unit`: the file's, in metres.
+/// Throws std::runtime_error with a sentence that names the file where it cannot be read or has no
+/// faces.
 Surface readOrganSurface(const OrganFile& file, double unit);
 
 /// Every mesh that listOrganFiles finds, but the classes in `exclude`. Those that cannot be read or
