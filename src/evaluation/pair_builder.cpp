@@ -55,20 +55,20 @@ void addCases(const Surface& surface, const OrganSource& source, int variation,
 
 Built buildSource(const OrganSource& source, const PairSettings& settings) {
   Built built{{source.organ, source.subject, source.name, {}, {}, 0}, {}};
-  int variation = 0;
+  std::string which;  // what an error is about; where the file cannot be read it says so itself
   try {
     const auto [original, sha256] = source.load();
+    which = source.name + ": ";
     built.record.sha256 = sha256;
     const std::string reason = rejectionReason(original, source.organ, settings.limits);
-    if (!reason.empty()) throw std::runtime_error(source.name + ": " + reason);
+    if (!reason.empty()) throw std::runtime_error(reason);
     addCases(original, source, 0, settings, built);
-    for (variation = 1; variation <= settings.variations; ++variation) {
+    for (int variation = 1; variation <= settings.variations; ++variation) {
+      which = source.name + ", variation " + std::to_string(variation) + ": ";
       addCases(drawVariation(original, source, variation, settings), source, variation, settings,
                built);
     }
   } catch (const std::exception& error) {
-    const std::string which =
-        variation == 0 ? "" : source.name + ", variation " + std::to_string(variation) + ": ";
     built.record.rejected.push_back(which + error.what());
   }
   built.record.cases = built.cases.size();

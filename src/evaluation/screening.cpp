@@ -139,6 +139,7 @@ std::string rejectionReason(const Surface& surface, const std::string& organ,
     return format("has %ld faces, fewer than %ld", static_cast<long>(measures.faces),
                   static_cast<long>(limits.min_faces));
   }
+  if (measures.main_piece == 0.0) return "has no face with an area";
   if (!(measures.main_piece >= limits.min_main_piece)) {
     return format("is in pieces: the largest has %.0f %% of the surface, less than %.0f %%",
                   100.0 * measures.main_piece, 100.0 * limits.min_main_piece);

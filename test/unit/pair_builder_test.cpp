@@ -108,6 +108,19 @@ TEST(PairBuilder, ListsWhatItLeavesOutAndGoesOn) {
   EXPECT_EQ(pairs.set.cases.size(), 4U);
 }
 
+TEST(PairBuilder, NamesTheSurfaceThatCannotBeDeformed) {
+  OrganSource flat = source("liver", 1);
+  flat.load = [] {
+    LoadedOrgan organ{makePhantom("liver", 1, 800), ""};
+    organ.surface.vertices.points.row(2).setZero();
+    return organ;
+  };
+  const BuiltPairs pairs = build({flat, source("kidney", 1)}, settings());
+  ASSERT_EQ(pairs.sources[0].rejected.size(), 1U);
+  EXPECT_EQ(pairs.sources[0].rejected[0].rfind("liver/1: ", 0), 0U) << pairs.sources[0].rejected[0];
+  EXPECT_EQ(pairs.set.cases.size(), 4U);
+}
+
 TEST(PairBuilder, RefusesSettingsThatMakeNoPairs) {
   PairSettings wrong = settings();
   wrong.protocols.clear();

@@ -91,6 +91,8 @@ TEST(Screening, SaysWhyASurfaceIsRejected) {
   for (int i = 0; i < 4; ++i) pieces = together(pieces, liver);
   expectReason(pieces, "liver", "is in pieces: the largest has 20 %");
   expectReason({liver.vertices, {}}, "liver", "has 0 faces");
+  expectReason({{Points::Zero(3, liver.vertices.size()), {}}, liver.faces}, "liver",
+               "has no face with an area");
 }
 
 TEST(Screening, GoesByTheLimitsGiven) {
