@@ -4,6 +4,7 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdio>
+#include <filesystem>
 #include <iostream>
 #include <thread>
 
@@ -118,6 +119,9 @@ ParsedPairsOptions parsePairsOptions(int argc, char** argv) {
       settings.protocols.push_back(protocolFromString(name));
     }
     for (const std::string& text : lengths) addLengthRange(text, settings.limits);
+    if (std::filesystem::path(options.output).extension() == ".json") {
+      throw CLI::ValidationError("--output", "the pair set would have the name of its manifest");
+    }
     if (options.data.empty() && options.phantoms == 0) {
       throw CLI::ValidationError("no organs", "give --data FOLDER or --phantoms N");
     }

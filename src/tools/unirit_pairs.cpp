@@ -9,6 +9,7 @@
 #include <fstream>
 #include <iostream>
 #include <map>
+#include <set>
 #include <sstream>
 #include <stdexcept>
 
@@ -69,6 +70,25 @@ std::vector<OrganSource> sourcesOf(const PairsOptions& options,
   return sources;
 }
 
+/// Seeds, and the rows of a benchmark, tell surfaces apart by these names.
+void requireDistinctNames(const std::vector<OrganSource>& sources) {
+  std::set<std::string> names;
+  for (const OrganSource& source : sources) {
+    if (!names.insert(source.name).second) {
+      throw std::runtime_error(source.name +
+                               " lies in two of the folders: give one folder that holds both");
+    }
+  }
+}
+
+/// Known before the work rather than after it.
+void requirePlaceFor(const std::string& path) {
+  fs::path folder = fs::absolute(path).parent_path();
+  while (!fs::exists(folder)) folder = folder.parent_path();
+  const bool usable = fs::is_directory(folder) && ::access(folder.c_str(), W_OK | X_OK) == 0;
+  if (!usable || fs::is_directory(path)) throw std::runtime_error(path + " cannot be written");
+}
+
 /// A line that is written over on a terminal, and every ten seconds elsewhere.
 class ProgressLine {
  public:
@@ -111,24 +131,35 @@ std::string divergencesOf(const PairSet& set, const DivergenceSettings& settings
   return toMarkdown(divergenceTable(clouds, settings));
 }
 
+void makeFolderOf(const std::string& path) {
+  fs::create_directories(fs::absolute(path).parent_path());
+}
+
 void writeText(const std::string& text, const std::string& path) {
+  makeFolderOf(path);
   writeAtomically(path, "file", [&](std::ostream& stream) { stream << text; });
 }
 
 void run(const PairsOptions& options) {
+  const std::string manifest = fs::path(options.output).replace_extension(".json").string();
+  for (const std::string& path : {options.output, manifest, options.divergences}) {
+    if (!path.empty()) requirePlaceFor(path);
+  }
   std::vector<std::string> left_out;
   const std::vector<OrganSource> sources = sourcesOf(options, left_out);
-  const BuiltPairs pairs = buildPairs(sources, options.settings, ProgressLine());
+  requireDistinctNames(sources);
   for (const std::string& sentence : left_out) std::cerr << "left out: " << sentence << '\n';
+  if (sources.empty()) throw std::runtime_error("no organ surface was found");
+  const BuiltPairs pairs = buildPairs(sources, options.settings, ProgressLine());
   for (const SourceRecord& source : pairs.sources) {
     for (const std::string& sentence : source.rejected) {
       std::cerr << "left out: " << sentence << '\n';
     }
   }
   if (pairs.set.cases.empty()) throw std::runtime_error("no pair could be made of these organs");
+  makeFolderOf(options.output);
   writePairSet(pairs.set, options.output);
-  writeText(pairsManifest(options, pairs, left_out, sha256Hex(contents(options.output))),
-            fs::path(options.output).replace_extension(".json").string());
+  writeText(pairsManifest(options, pairs, left_out, sha256Hex(contents(options.output))), manifest);
   if (!options.divergences.empty()) {
     writeText(divergencesOf(pairs.set, options.divergence), options.divergences);
   }

@@ -99,6 +99,14 @@ TEST_F(PairsTool, WritesTheSameBytesOnAnyNumberOfThreads) {
   EXPECT_FALSE(one == text("pairs.safetensors"));
 }
 
+TEST_F(PairsTool, MakesTheFolderOfItsOutputOnceThereIsSomethingToWrite) {
+  const std::string into = "--data flat --points 64 --output new/folder/pairs.safetensors ";
+  ASSERT_EQ(run(into + "--min-faces 100000"), 2);
+  EXPECT_FALSE(fs::exists(folder_ / "new"));
+  ASSERT_EQ(run(into), 0) << text("stderr");
+  EXPECT_TRUE(fs::exists(folder_ / "new/folder/pairs.json"));
+}
+
 TEST_F(PairsTool, ScreensByTheLimitsGiven) {
   ASSERT_EQ(run(std::string(kSmall) + "--length liver=30:380 --exclude kidney"), 0);
   EXPECT_EQ(readPairSet(at("pairs.safetensors")).cases.size(), 2U);  // the small liver too
@@ -121,8 +129,13 @@ TEST_F(PairsTool, RefusesUnusableArgumentsWithASentence) {
       {"--data flat --output x --protocols caseA", "unknown protocol 'caseA'"},
       {"--data flat --output x --length liver=9", "is not ORGAN=LEAST:MOST"},
       {"--data flat --output x --length liver=9:3", "is not ORGAN=LEAST:MOST"},
-      {"--data flat --output no/such/folder.safetensors", "cannot be written"},
+      {"--data flat --output flat/s0001_liver.ply/pairs.safetensors", "cannot be written"},
+      {"--data flat --output flat", "cannot be written"},
+      {"--data flat --output pairs.json", "the name of its manifest"},
+      {"--data flat --data flat --output pairs.safetensors", "lies in two of the folders"},
+      {"--data empty --output pairs.safetensors", "no organ surface was found"},
   };
+  fs::create_directories(folder_ / "empty");
   for (const auto& [arguments, words] : calls) {
     EXPECT_EQ(run(arguments), 2) << arguments;
     EXPECT_NE(text("stderr").find(words), std::string::npos) << text("stderr");
