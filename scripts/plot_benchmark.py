@@ -3,9 +3,10 @@
 """Draws what unirit_benchmark wrote: plot_benchmark.py FOLDER [OUTPUT]
 
 FOLDER is the benchmark's --output. OUTPUT (default: FOLDER/plots) gets PNG and SVG files for each
-protocol: error per organ, error against the displacement before, accuracy against time; and, where
-the benchmark ran with --clouds, the worst cases of each method before and after. Needs matplotlib
-and numpy (python3-matplotlib).
+protocol: error per organ, error against the displacement before, accuracy against time; the error
+against the share in view, where it ran on several (partial:50,partial:40,...); and, where it ran
+with --clouds, the worst cases of each method before and after. Needs matplotlib and numpy
+(python3-matplotlib).
 """
 import collections
 import csv
@@ -40,7 +41,7 @@ def column(rows, name):
 
 def save(figure, output, name):
     for ending in ("png", "svg"):
-        figure.savefig(os.path.join(output, f"{name}.{ending}"), dpi=120, bbox_inches="tight",
+        figure.savefig(os.path.join(output, f"{name.replace(':', '_')}.{ending}"), dpi=120, bbox_inches="tight",
                        metadata={"Date": None} if ending == "svg" else {})
     plt.close(figure)
 
@@ -93,6 +94,29 @@ def plot_time(protocol, methods, output):
     save(figure, output, f"time_{protocol}")
 
 
+def plot_shares(protocol, shares, output):
+    """`shares`: methods and their rows, by percent in view."""
+    metrics = [("mean RMSE [mm]", lambda rows: column(rows, "rmse_mm").mean()),
+               ("worse than the start [% of cases]", lambda rows: 100 * np.mean(
+                   column(rows, "rmse_mm") > column(rows, "before_mm"))),
+               ("refused [% of cases]", lambda rows: 100 * column(rows, "refused").mean())]
+    figure, panels = plt.subplots(1, len(metrics), figsize=(4 * len(metrics), 3.8))
+    percents = sorted(shares)
+    for axes, (label, metric) in zip(panels, metrics):
+        for method in shares[percents[0]]:
+            axes.plot(percents, [metric(shares[percent][method]) for percent in percents], "o-",
+                      label=method, alpha=0.8)
+        axes.set_xticks(percents)
+        axes.invert_xaxis()
+        axes.set_ylim(bottom=0)
+        axes.set_xlabel("surface in view [%]")
+        axes.set_ylabel(label)
+        axes.grid(alpha=0.3)
+    panels[0].legend(fontsize=7)
+    caption(panels[1], protocol, shares[percents[0]])
+    save(figure, output, f"shares_{protocol}")
+
+
 def draw(axes, clouds, title):
     for cloud, colour in clouds:
         flat = cloud @ OBLIQUE.T
@@ -122,13 +146,20 @@ def main(folder, output=None):
     output = output or os.path.join(folder, "plots")
     os.makedirs(output, exist_ok=True)
     matplotlib.rcParams["svg.hashsalt"] = "unirit"  # the same rows give the same files
+    shares = collections.defaultdict(dict)
     for protocol, methods in read_rows(folder).items():
+        kind, _, percent = protocol.partition(":")
+        if percent:
+            shares[kind][float(percent)] = methods
         plot_organs(protocol, methods, output)
         plot_displacement(protocol, methods, output)
         plot_time(protocol, methods, output)
         if os.path.isdir(os.path.join(folder, "clouds", protocol)):
             for method, rows in methods.items():
                 plot_worst(protocol, method, rows, folder, output)
+    for protocol, percents in shares.items():
+        if len(percents) > 1:
+            plot_shares(protocol, percents, output)
 
 
 if __name__ == "__main__":

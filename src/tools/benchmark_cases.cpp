@@ -3,9 +3,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <filesystem>
 #include <memory>
 #include <stdexcept>
+#include <utility>
 
 #include "chosen_organs.hpp"
 #include "unirit/evaluation/case_folder.hpp"
@@ -14,6 +16,8 @@
 
 namespace unirit {
 namespace {
+
+constexpr Eigen::Index kSurfaceSamples = 20000;
 
 /// Turns both clouds together: the problem stays the same, but the network was made for organs as
 /// scanners lay them.
@@ -27,6 +31,31 @@ void turn(RegistrationPair& pair, double degrees, std::uint64_t seed) {
   }
   pair.best_rigid = rotation * pair.best_rigid * rotation.inverse();
   if (pair.viewpoint) pair.viewpoint = turned * *pair.viewpoint;
+}
+
+/// Of "partial:30": the protocol, and its view with 30 % of the surface seen.
+std::pair<Protocol, View> parseProtocol(const std::string& text) {
+  const std::size_t colon = text.find(':');
+  const Protocol protocol = protocolFromString(text.substr(0, colon));
+  View view = viewOf(protocol);
+  if (colon == std::string::npos) return {protocol, view};
+  double percent = 0.0;
+  char end = '\0';
+  if (view.visible_share == 1.0 ||
+      std::sscanf(text.c_str() + colon, ":%lf%c", &percent, &end) != 1 ||
+      !(percent > 0.0 && percent < 100.0)) {
+    throw std::invalid_argument("protocol '" + text +
+                                "': only partial and intraop take a share in view, in percent");
+  }
+  view.visible_share = percent / 100.0;
+  return {protocol, view};
+}
+
+/// The pair that makePair makes of a protocol with this view.
+RegistrationPair pairUnder(const View& view, const Surface& organ, int points, std::uint64_t seed) {
+  Random random(seed);
+  const DeformedOrgan deformed(organ, random.next());
+  return deformed.pair(view, points, random.next(), kSurfaceSamples);
 }
 
 std::string labelOf(const BenchmarkOptions& options) {
@@ -45,8 +74,8 @@ std::vector<BenchmarkCase> storedCases(const BenchmarkOptions& options) {
   std::vector<BenchmarkCase> cases;
   for (const CaseFolder& folder : listCaseFolders(options.cases)) {
     if (!wanted(options, folder.protocol)) continue;
-    cases.push_back({labelOf(options), protocolFromString(folder.protocol), folder.organ,
-                     folder.subject, "stored",
+    cases.push_back({labelOf(options), folder.protocol, protocolFromString(folder.protocol),
+                     folder.organ, folder.subject, "stored",
                      [path = folder.path] { return readCaseFolder(path); }});
   }
   return cases;
@@ -61,7 +90,8 @@ std::vector<BenchmarkCase> pairSetCases(const BenchmarkOptions& options) {
       std::string subject = one.subject;
       if (one.variation > 0) subject += " variation " + std::to_string(one.variation);
       if (one.deformation > 0) subject += " deformation " + std::to_string(one.deformation);
-      cases.push_back({labelOf(options), protocol, one.organ, subject, std::to_string(one.seed),
+      cases.push_back({labelOf(options), toString(protocol), protocol, one.organ, subject,
+                       std::to_string(one.seed),
                        [set, &one, protocol] { return set->pair(one, protocol); }});
     }
   }
@@ -74,18 +104,19 @@ std::vector<BenchmarkCase> madeCases(const BenchmarkOptions& options) {
   const std::string label = labelOf(options);
   std::vector<BenchmarkCase> cases;
   for (const std::string& name : options.protocols) {
-    const Protocol protocol = protocolFromString(name);
+    const auto [protocol, view] = parseProtocol(name);
     std::uint64_t number = 0;
     for (const Organ& organ : *organs) {
       for (int i = 0; i < options.pairs; ++i) {
         const std::uint64_t seed = options.seed * 1000003ULL + number++;
-        const auto load = [organs, &organ, protocol, seed, points = options.points,
+        const auto load = [organs, &organ, view = view, seed, points = options.points,
                            angle = options.common_rotation] {
-          RegistrationPair pair = makePair(organ.surface, protocol, points, seed);
+          RegistrationPair pair = pairUnder(view, organ.surface, points, seed);
           if (angle > 0.0) turn(pair, angle, seed);
           return pair;
         };
-        cases.push_back({label, protocol, organ.name, organ.subject, std::to_string(seed), load});
+        cases.push_back(
+            {label, name, protocol, organ.name, organ.subject, std::to_string(seed), load});
       }
     }
   }

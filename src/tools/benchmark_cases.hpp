@@ -13,7 +13,8 @@ namespace unirit {
 /// A registration problem before it is read or made.
 struct BenchmarkCase {
   std::string data;
-  Protocol protocol = Protocol::kPermuted;
+  std::string protocol;                 ///< as asked for: "partial:30"
+  Protocol kind = Protocol::kPermuted;  ///< methods are tuned for it
   std::string organ;
   std::string subject;
   std::string seed;  ///< "stored" where the case is read from files

@@ -25,7 +25,8 @@ void addDataOptions(CLI::App& app, BenchmarkOptions& options) {
       ->delimiter(',')
       ->capture_default_str();
   app.add_option("--protocols", options.protocols,
-                 "paired, permuted, resampled, caseb, partial, offset, intraop")
+                 "paired, permuted, resampled, caseb, partial, offset, intraop; partial:30 shows "
+                 "30 % of the surface, intraop:30 too (not with --cases)")
       ->delimiter(',')
       ->capture_default_str();
   app.add_option("--pairs", options.pairs, "Pairs of each organ")

@@ -41,8 +41,8 @@ struct Described {
 
 void writeClouds(const BenchmarkCase& problem, const RegistrationPair& pair,
                  const std::string& method, const Points& moved, const std::string& output) {
-  const std::string folder = output + "/clouds/" + toString(problem.protocol) + "/" +
-                             problem.organ + "_" + problem.subject;
+  const std::string folder =
+      output + "/clouds/" + problem.protocol + "/" + problem.organ + "_" + problem.subject;
   std::filesystem::create_directories(folder);
   const auto write = [&](const std::string& name, const Points& points) {
     writePly({{points, Points()}, {}}, folder + "/" + name + ".ply", 0.001);
@@ -85,8 +85,8 @@ class Run {
     for (std::size_t i = next_case_++; i < cases_.size(); i = next_case_++) {
       const RegistrationPair pair = cases_[i].load();
       for (std::size_t j = 0; j < methods_.size(); ++j) {
-        auto& method = methods[{j, cases_[i].protocol}];
-        if (!method) method = make(j, cases_[i].protocol);
+        auto& method = methods[{j, cases_[i].kind}];
+        if (!method) method = make(j, cases_[i].kind);
         records_[i * methods_.size() + j] = record(cases_[i], pair, methods_[j].label, *method);
       }
       tell();
@@ -109,7 +109,7 @@ class Run {
     record.method = label.empty() ? method.name() : label;
     record.parameters = method.parameters();
     record.data = problem.data;
-    record.protocol = toString(problem.protocol);
+    record.protocol = problem.protocol;
     record.organ = problem.organ;
     record.subject = problem.subject;
     record.seed = problem.seed;

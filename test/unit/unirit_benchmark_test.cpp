@@ -10,6 +10,7 @@
 #include <set>
 #include <sstream>
 
+#include "unirit/io/surface_io.hpp"
 #include "unirit/network/weights.hpp"
 
 namespace unirit {
@@ -137,6 +138,32 @@ TEST_F(BenchmarkTool, TablesNameTheWeights) {
   EXPECT_NE(text("out/tables.md").find("| fpt |"), std::string::npos);
 }
 
+TEST_F(BenchmarkTool, ShowsTheShareThatAProtocolNames) {
+  const std::string command = "--phantoms 1 --points 100 --methods identity,icp --clouds ";
+  ASSERT_EQ(run(command + "--protocols partial,partial:40,partial:10 --output out"), 0)
+      << text("stderr");
+  const auto json = nlohmann::json::parse(text("out/tables.json"));
+  ASSERT_EQ(json.size(), 3U);
+  EXPECT_EQ(json[0]["protocol"], "partial");
+  EXPECT_EQ(json[1]["protocol"], "partial:40");
+  EXPECT_EQ(json[2]["protocol"], "partial:10");
+  for (const char* metric : {"rmse_mm", "chamfer_mm"}) {
+    const auto icp = [&](int protocol) { return json[protocol]["methods"][1]["all"][metric]; };
+    EXPECT_EQ(icp(0), icp(1)) << "the protocol shows 40 %";
+    EXPECT_NE(icp(0), icp(2));
+  }
+  for (const auto& entry : fs::directory_iterator(folder_ / "out/clouds/partial:10")) {
+    const auto extentOf = [&](const std::string& protocol) {
+      return extent(
+          readSurface(
+              (folder_ / "out/clouds" / protocol / entry.path().filename() / "target.ply").string(),
+              0.001)
+              .surface.vertices.points);
+    };
+    EXPECT_LT(extentOf("partial:10"), extentOf("partial")) << entry.path();
+  }
+}
+
 TEST_F(BenchmarkTool, WritesCloudsWhereAsked) {
   ASSERT_EQ(run("--phantoms 1 --points 64 --protocols caseb --methods identity --clouds "
                 "--output out"),
@@ -162,6 +189,9 @@ TEST_F(BenchmarkTool, RefusesFaultyRequestsInASentence) {
   refuses(phantoms + "--methods cdp", "unknown");
   refuses(phantoms + "--methods unirit", "needs weights");
   refuses(phantoms + "--protocols caseA --methods identity", "unknown protocol 'caseA'");
+  for (const char* share : {"partial:0", "partial:100", "partial:30%", "partial:", "caseb:30"}) {
+    refuses(phantoms + "--methods identity --protocols " + share, std::string("'") + share + "'");
+  }
   refuses(phantoms + "--shard 3/2", "--shard");
   refuses("--cases nowhere --methods identity", "nowhere");
   fs::create_directories(folder_ / "bad");
