@@ -5,8 +5,8 @@
 FOLDER is the benchmark's --output. OUTPUT (default: FOLDER/plots) gets PNG and SVG files for each
 protocol: error per organ, error against the displacement before, accuracy against time; the error
 against the share in view, where it ran on several (partial:50,partial:40,...); and, where it ran
-with --clouds, the worst cases of each method before and after. Needs matplotlib and numpy
-(python3-matplotlib).
+with --clouds, the worst cases of each method before and after, and the true errors against the
+deviations that a method expects of its points. Needs matplotlib and numpy (python3-matplotlib).
 """
 import collections
 import csv
@@ -23,6 +23,7 @@ import numpy as np
 from point_files import read_ply
 
 WORST = 3
+BINS = 10
 OBLIQUE = np.array([[0.87, 0.50, 0.0], [0.17, -0.30, 0.94]])  # rows span the drawing plane
 
 
@@ -40,10 +41,15 @@ def column(rows, name):
 
 
 def save(figure, output, name):
+    path = os.path.join(output, name.replace(":", "_"))
     for ending in ("png", "svg"):
-        figure.savefig(os.path.join(output, f"{name.replace(':', '_')}.{ending}"), dpi=120, bbox_inches="tight",
+        figure.savefig(f"{path}.{ending}", dpi=120, bbox_inches="tight",
                        metadata={"Date": None} if ending == "svg" else {})
     plt.close(figure)
+
+
+def word(method):
+    return re.sub("[^A-Za-z0-9+-]+", "_", method).strip("_")
 
 
 def caption(axes, protocol, methods):
@@ -100,7 +106,8 @@ def plot_shares(protocol, shares, output):
                ("worse than the start [% of cases]", lambda rows: 100 * np.mean(
                    column(rows, "rmse_mm") > column(rows, "before_mm"))),
                ("refused [% of cases]", lambda rows: 100 * column(rows, "refused").mean())]
-    figure, panels = plt.subplots(1, len(metrics), figsize=(4 * len(metrics), 3.8))
+    figure, panels = plt.subplots(1, len(metrics), figsize=(4 * len(metrics), 3.8),
+                                  layout="constrained")
     percents = sorted(shares)
     for axes, (label, metric) in zip(panels, metrics):
         for method in shares[percents[0]]:
@@ -139,14 +146,51 @@ def plot_worst(protocol, method, rows, folder, output):
                                  (read_ply(f"{case}/{name}.ply"), "tab:red")],
                  f"{row['organ']} {row['subject']}: {float(row[key]):.1f} mm")
     figure.suptitle(f"{protocol}, {method}: worst cases, before and after", fontsize=9)
-    save(figure, output, f"worst_{protocol}_{re.sub('[^A-Za-z0-9+-]+', '_', method).strip('_')}")
+    save(figure, output, f"worst_{protocol}_{word(method)}")
+
+
+def read_deviations(folder, protocol, method, rows):
+    """Expected deviations and true errors of all points of all cases that tell them [mm]."""
+    expected, errors = [], []
+    for row in rows:
+        case = os.path.join(folder, "clouds", protocol, f"{row['organ']}_{row['subject']}")
+        if os.path.exists(f"{case}/deviations of {method}.txt"):
+            expected.append(np.loadtxt(f"{case}/deviations of {method}.txt"))
+            errors.append(np.linalg.norm(read_ply(f"{case}/moved by {method}.ply") -
+                                         read_ply(f"{case}/truth.ply"), axis=1))
+    return np.concatenate(expected or [[]]), np.concatenate(errors or [[]])
+
+
+def plot_calibration(method, protocols, output):
+    """`protocols`: expected deviations and true errors by protocol, in bins of equal size."""
+    def root_mean_square(values):
+        return np.sqrt((values ** 2).mean())
+
+    figure, axes = plt.subplots(figsize=(5, 5))
+    limit = 0.0
+    for protocol, (expected, errors) in protocols.items():
+        bins = np.array_split(np.argsort(expected, kind="stable"), BINS)
+        points = np.array([[root_mean_square(values[part]) for values in (expected, errors)]
+                           for part in bins])
+        whole = root_mean_square(errors) / root_mean_square(expected)
+        axes.plot(*points.T, "o-", label=f"{protocol}: {whole:.2f} of it on the whole", alpha=0.8)
+        limit = max(limit, 1.05 * points.max())
+    axes.plot([0, limit], [0, limit], "k:", linewidth=1)
+    axes.set_xlim(0, limit)
+    axes.set_ylim(0, limit)
+    axes.set_xlabel("standard deviation as the method has it [mm]")
+    axes.set_ylabel("RMS error [mm]")
+    axes.set_title(method, fontsize=9)
+    axes.grid(alpha=0.3)
+    axes.legend(fontsize=8)
+    save(figure, output, f"calibration_{word(method)}")
 
 
 def main(folder, output=None):
     output = output or os.path.join(folder, "plots")
     os.makedirs(output, exist_ok=True)
     matplotlib.rcParams["svg.hashsalt"] = "unirit"  # the same rows give the same files
-    shares = collections.defaultdict(dict)
+    shares, deviations = collections.defaultdict(dict), collections.defaultdict(dict)
     for protocol, methods in read_rows(folder).items():
         kind, _, percent = protocol.partition(":")
         if percent:
@@ -157,9 +201,14 @@ def main(folder, output=None):
         if os.path.isdir(os.path.join(folder, "clouds", protocol)):
             for method, rows in methods.items():
                 plot_worst(protocol, method, rows, folder, output)
+                expected, errors = read_deviations(folder, protocol, method, rows)
+                if expected.size:
+                    deviations[method][protocol] = expected, errors
     for protocol, percents in shares.items():
         if len(percents) > 1:
             plot_shares(protocol, percents, output)
+    for method, protocols in deviations.items():
+        plot_calibration(method, protocols, output)
 
 
 if __name__ == "__main__":

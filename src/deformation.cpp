@@ -41,6 +41,8 @@ class InterpolatedField : public DisplacementField {
 
   Eigen::RowVectorXf confidence(const Points&) const override { return {}; }
 
+  float priorDeviation() const override { return 0.0F; }
+
  private:
   Eigen::Vector3f at(const Eigen::Vector3f& point) const {
     const auto nearest = neighbours_.find<kInterpolationNeighbours>(point);
@@ -121,6 +123,10 @@ std::vector<Eigen::Matrix3f> Deformation::jacobians(const Points& preoperative) 
 
 Eigen::RowVectorXf Deformation::confidence(const Points& preoperative) const {
   return field_->confidence(preoperative);
+}
+
+Eigen::RowVectorXf Deformation::deviations() const {
+  return field_->priorDeviation() * (1.0F - confidence().array()).sqrt();
 }
 
 }  // namespace unirit

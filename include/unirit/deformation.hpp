@@ -24,6 +24,10 @@ class DisplacementField {
   /// How much has been learnt of each point's displacement, a row of Q in [0, 1]: one minus its
   /// variance over the variance before anything was seen. Empty where the field cannot tell.
   virtual Eigen::RowVectorXf confidence(const Points& preoperative) const = 0;
+
+  /// Standard deviation of a point's displacement, as a length, before anything was seen [m]. Zero
+  /// where the field cannot tell.
+  virtual float priorDeviation() const = 0;
 };
 
 /// What a field says of points: its displacements, 3 x Q [m], and its confidence, a row of Q or
@@ -69,6 +73,10 @@ class Deformation {
   /// Of the surface points.
   const Points& displacements() const { return at_surface_.displacements; }
   const Eigen::RowVectorXf& confidence() const { return at_surface_.confidence; }
+
+  /// Of the surface points: the standard deviation of each displacement, as a length, that is left
+  /// after the cloud was seen [m]. Empty where the field cannot tell.
+  Eigen::RowVectorXf deviations() const;
 
  private:
   Eigen::Isometry3d T_intraoperative_preoperative_;

@@ -55,9 +55,9 @@ MethodResult Unirit::registerPair(const RegistrationPair& pair) {
     result.refused = true;
     return result;
   }
-  return {false, registration.deformation->movedSurface(),
-          registration.deformation->move(pair.interior),
-          registration.T_intraoperative_preoperative};
+  const Deformation& deformation = *registration.deformation;
+  return {false, deformation.movedSurface(), deformation.move(pair.interior),
+          registration.T_intraoperative_preoperative, deformation.deviations()};
 }
 
 UniritByRows::UniritByRows(std::shared_ptr<const Weights> weights)

@@ -2,6 +2,7 @@
 #include "coherent_field.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 #include <vector>
 
@@ -48,6 +49,10 @@ std::vector<Eigen::Matrix3f> CoherentField::gradients(const Points& preoperative
 Eigen::RowVectorXf CoherentField::confidence(const Points& preoperative) const {
   ThreadTeam alone(1);
   return valuesAt(prior_->functions(normalisation_.apply(preoperative)), alone).confidence;
+}
+
+float CoherentField::priorDeviation() const {
+  return normalisation_.scale * std::sqrt(3.0F * prior_->variance());
 }
 
 FieldValues CoherentField::valuesAt(const Eigen::MatrixXf& functions, ThreadTeam& team) const {

@@ -21,6 +21,7 @@ class CoherentField : public DisplacementField {
   Points displacements(const Points& preoperative) const override;
   std::vector<Eigen::Matrix3f> gradients(const Points& preoperative) const override;
   Eigen::RowVectorXf confidence(const Points& preoperative) const override;
+  float priorDeviation() const override;
 
   /// The same at points where the values of the prior's functions, rank x Q, are known.
   FieldValues valuesAt(const Eigen::MatrixXf& functions, ThreadTeam& team) const;

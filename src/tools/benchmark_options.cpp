@@ -61,7 +61,9 @@ void addRunOptions(CLI::App& app, BenchmarkOptions& options, std::string& shard)
       ->capture_default_str();
   app.add_option("--shard", shard, "I/N: computes every N-th case alone, to be merged");
   app.add_flag("--merge", options.merge, "Computes nothing, merges the shards in --output");
-  app.add_flag("--clouds", options.clouds, "Writes the clouds of every case computed, too");
+  app.add_flag("--clouds", options.clouds,
+               "Writes the clouds of every case computed, too, and the deviations that methods "
+               "expect of their points");
 }
 
 void parseShard(const std::string& text, BenchmarkOptions& options) {

@@ -7,6 +7,7 @@
 #include <chrono>
 #include <exception>
 #include <filesystem>
+#include <fstream>
 #include <iostream>
 #include <map>
 #include <mutex>
@@ -40,7 +41,7 @@ struct Described {
 };
 
 void writeClouds(const BenchmarkCase& problem, const RegistrationPair& pair,
-                 const std::string& method, const Points& moved, const std::string& output) {
+                 const std::string& method, const MethodResult& result, const std::string& output) {
   const std::string folder =
       output + "/clouds/" + problem.protocol + "/" + problem.organ + "_" + problem.subject;
   std::filesystem::create_directories(folder);
@@ -50,7 +51,10 @@ void writeClouds(const BenchmarkCase& problem, const RegistrationPair& pair,
   write("source", pair.source);
   write("target", pair.target);
   write("truth", pair.truth);
-  write("moved by " + method, moved);
+  write("moved by " + method, result.source);
+  if (result.deviations.size() == 0) return;
+  const Eigen::RowVectorXf millimetres = 1000.0F * result.deviations;
+  std::ofstream(folder + "/deviations of " + method + ".txt") << millimetres.transpose() << '\n';
 }
 
 /// What the workers share.
@@ -128,7 +132,7 @@ class Run {
     record.errors = registrationErrors(pair, result);
     const std::lock_guard<std::mutex> lock(mutex_);
     if (options_.clouds) {
-      writeClouds(problem, pair, record.method, result.source, options_.output);
+      writeClouds(problem, pair, record.method, result, options_.output);
     }
     appendRecord(record, options_.recordsPath());
     return record;

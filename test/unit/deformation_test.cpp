@@ -78,16 +78,19 @@ class Shift : public DisplacementField {
   Eigen::RowVectorXf confidence(const Points& preoperative) const override {
     return Eigen::RowVectorXf::Constant(preoperative.cols(), 0.5F);
   }
+  float priorDeviation() const override { return 0.01F; }
 };
 
 TEST(Deformation, TakesWhatTheFieldSaysOfTheSurfaceAndAsksItOfOtherPoints) {
   const auto field = std::make_shared<const Shift>();
   const Points surface = test::bumpyEllipsoid(30, 5), others = test::bumpyEllipsoid(7, 6);
-  const Deformation deformation(somePose(), surface, field,
-                                {Points::Constant(3, 30, 0.02F), Eigen::RowVectorXf::Ones(30)});
+  const Eigen::RowVectorXf sure = Eigen::RowVectorXf::LinSpaced(30, 0.0F, 1.0F);
+  const Deformation deformation(somePose(), surface, field, {Points::Constant(3, 30, 0.02F), sure});
   const Points rigid = deformation.moveRigidly(surface);
   EXPECT_TRUE(deformation.movedSurface().isApprox((rigid.array() + 0.02F).matrix(), 1e-6F));
-  EXPECT_EQ(deformation.confidence(), Eigen::RowVectorXf::Ones(30));
+  EXPECT_EQ(deformation.confidence(), sure);
+  EXPECT_FLOAT_EQ(deformation.deviations()[0], 0.01F) << "nothing was learnt";
+  EXPECT_EQ(deformation.deviations()[29], 0.0F) << "nothing is left";
   const Points shift = deformation.move(others) - deformation.moveRigidly(others);
   EXPECT_TRUE(shift.isApprox(field->displacements(others), 1e-4F));
   EXPECT_EQ(deformation.confidence(others), field->confidence(others));

@@ -195,6 +195,7 @@ TEST(RefinedDeformation, KnowsItsConfidenceAnywhereUnlikeTheNetworks) {
   const Registration network =
       registered(organ(pair), seen(pair), {Stage::kRigid, Stage::kNonRigid});
   EXPECT_EQ(network.deformation->confidence(pair.interior).size(), 0);
+  EXPECT_EQ(network.deformation->deviations().size(), 0);
 }
 
 }  // namespace

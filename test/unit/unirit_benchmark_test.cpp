@@ -179,6 +179,30 @@ TEST_F(BenchmarkTool, WritesCloudsWhereAsked) {
   EXPECT_EQ(cases, figures("out/cases.csv").size());
 }
 
+TEST_F(BenchmarkTool, WritesTheDeviationsThatAMethodExpects) {
+  writeWeights(randomWeights(Pairing::kNearest, 1), (folder_ / "random.safetensors").string());
+  ASSERT_EQ(run("--phantoms 1 --points 200 --protocols resampled --weights random.safetensors "
+                "--methods identity,ours@unirit:stages=refine --clouds --output out"),
+            0)
+      << text("stderr");
+  std::size_t told = 0;
+  for (const auto& entry : fs::directory_iterator(folder_ / "out/clouds/resampled")) {
+    const fs::path base = fs::path("out/clouds/resampled") / entry.path().filename();
+    EXPECT_FALSE(fs::exists(folder_ / base / "deviations of identity.txt"));
+    const fs::path file = base / "deviations of ours.txt";
+    if (!fs::exists(folder_ / file)) continue;  // refused
+    ++told;
+    std::istringstream lines(text(file));
+    std::size_t points = 0;
+    for (double deviation = 0.0; lines >> deviation; ++points) {
+      EXPECT_GT(deviation, 0.0);
+      EXPECT_LT(deviation, 20.0) << "mm: the prior's, of a phantom";
+    }
+    EXPECT_EQ(points, 200U) << base;
+  }
+  EXPECT_GT(told, 0U);
+}
+
 TEST_F(BenchmarkTool, RefusesFaultyRequestsInASentence) {
   const auto refuses = [&](const std::string& arguments, const std::string& words) {
     EXPECT_EQ(run(arguments), 2) << arguments;

@@ -15,6 +15,8 @@ struct MethodResult {
   Points source;         ///< 3 x N, the pair's source points, moved
   Points interior;       ///< 3 x M, the pair's interior points, moved
   std::optional<Eigen::Isometry3d> pose;  ///< the rigid part, where the method has one
+  Eigen::RowVectorXf deviations = {};     ///< of the source's points, as a length, as the method
+                                          ///< has them [m]; empty where it does not
 };
 
 /// A way to register: ours and its rivals, told apart by name in the benchmark's tables. It sees
