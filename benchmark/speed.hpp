@@ -44,6 +44,8 @@ inline void setRate(benchmark::State& state, double multiply_adds) {
       benchmark::Counter(2e-9 * multiply_adds, benchmark::Counter::kIsIterationInvariantRate);
 }
 
-inline double forwardMultiplyAdds() { return multiplyAdds(kPoints, kPoints, {}, true); }
+inline double forwardMultiplyAdds() {
+  return multiplyAdds(kPoints, kPoints, kRigidIterations, Pairing::kNearest, true);
+}
 
 }  // namespace unirit::speed

@@ -37,7 +37,6 @@ struct SamplingSettings {
 /// How the network is run.
 struct NetworkSettings {
   int rigid_iterations = 8;             ///< n of the paper's rigid module
-  int nonrigid_iterations = 1;          ///< of the non-rigid module; the paper's runs once
   Pairing pairing = Pairing::kNearest;  ///< must be the one the weights were trained with
 };
 
@@ -128,8 +127,6 @@ void visitSettings(Settings& settings, Visitor&& visitor) {
   visitor("sampling/points", settings.sampling.points, 64, 16384, "points kept of each cloud");
   visitor("network/rigid_iterations", settings.network.rigid_iterations, 1, 32,
           "iterations of the rigid module");
-  visitor("network/nonrigid_iterations", settings.network.nonrigid_iterations, 1, 32,
-          "iterations of the non-rigid module");
   auto& r = settings.refinement;
   visitor("refinement/pose_iterations", r.pose_iterations, 0, 100,
           "iterations of the pose alone, with few points");

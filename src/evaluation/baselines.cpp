@@ -61,7 +61,7 @@ MethodResult Unirit::registerPair(const RegistrationPair& pair) {
 }
 
 UniritByRows::UniritByRows(std::shared_ptr<const Weights> weights)
-    : network_(weights, {NetworkSettings().rigid_iterations, 1, Pairing::kRow}, 1) {}
+    : network_(weights, {NetworkSettings().rigid_iterations, Pairing::kRow}, 1) {}
 
 std::string UniritByRows::parameters() const { return "weights=" + network_.weights().sha256; }
 

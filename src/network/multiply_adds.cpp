@@ -16,21 +16,22 @@ double multiplyAddsPerRow(const Widths& widths) {
 
 }  // namespace
 
-double multiplyAdds(Eigen::Index source_points, Eigen::Index target_points,
-                    const NetworkSettings& settings, bool with_savings) {
+double multiplyAdds(Eigen::Index source_points, Eigen::Index target_points, int rigid_iterations,
+                    Pairing pairing, bool with_savings) {
   const auto sources = static_cast<double>(source_points);
   const auto targets = static_cast<double>(target_points);
   const double encoder = multiplyAddsPerRow(kEncoderWidths);
-  const double rigid = encoder * (settings.rigid_iterations * sources + targets) +
-                       settings.rigid_iterations * multiplyAddsPerRow(kRigidDecoderWidths);
+  const double rigid = encoder * (rigid_iterations * sources + targets) +
+                       rigid_iterations * multiplyAddsPerRow(kRigidDecoderWidths);
 
   constexpr double kFirstOutputs = kNonRigidDecoderHiddenWidths.front();
   constexpr double kFeatureColumns = 2.0 * kFeatureSize * kFirstOutputs;
-  const double point_columns = nonRigidDecoderInputs(settings.pairing) * kFirstOutputs - kFeatureColumns;
-  const double decoder =
+  const double point_columns = nonRigidDecoderInputs(pairing) * kFirstOutputs - kFeatureColumns;
+  const double nonrigid =
+      encoder * (sources + targets) +
       sources * (point_columns + multiplyAddsPerRow(kNonRigidDecoderHiddenWidths)) +
       (with_savings ? 1.0 : sources) * kFeatureColumns;
-  return rigid + encoder * targets + settings.nonrigid_iterations * (encoder * sources + decoder);
+  return rigid + nonrigid;
 }
 
 }  // namespace unirit

@@ -32,9 +32,6 @@ void requireFit(const std::shared_ptr<const Weights>& weights, const NetworkSett
   if (settings.rigid_iterations < 1) {
     throw std::invalid_argument("settings.rigid_iterations: must be at least 1");
   }
-  if (settings.nonrigid_iterations < 1) {
-    throw std::invalid_argument("settings.nonrigid_iterations: must be at least 1");
-  }
   validate(*weights);
 }
 
@@ -46,13 +43,11 @@ struct Network::Implementation {
       : weights(std::move(shared_weights)),
         pairing(settings.pairing),
         rigid_iterations(settings.rigid_iterations),
-        nonrigid_iterations(settings.nonrigid_iterations),
         workspace(selectKernels(), threads) {}
 
   std::shared_ptr<const Weights> weights;
   Pairing pairing;
   int rigid_iterations;
-  int nonrigid_iterations;
   Workspace workspace;
   Encoder rigid_source{workspace.kernels(), *weights, "rigid.source_encoder"};
   Encoder rigid_target{workspace.kernels(), *weights, "rigid.target_encoder"};
@@ -63,7 +58,6 @@ struct Network::Implementation {
   Eigen::VectorXf rigid_features = Eigen::VectorXf::Zero(2 * kFeatureSize);
   Eigen::VectorXf nonrigid_features = Eigen::VectorXf::Zero(2 * kFeatureSize);
   Points moved;
-  Points moved_queries, step;
 };
 
 Network::Network(std::shared_ptr<const Weights> weights, const NetworkSettings& settings,
@@ -132,24 +126,9 @@ void Network::estimateDisplacements(const Points& source, const Points& target,
         "queries: with pairing row they must be the source's points, as many as the target's");
   }
   float* features = network.nonrigid_features.data();
+  network.nonrigid_source.encode(source, features, network.workspace);
   network.nonrigid_target.encode(target, features + kFeatureSize, network.workspace);
-
-  const bool queries_are_source = queries.cols() == source.cols() && queries == source;
-  network.moved = source;
-  network.moved_queries = queries;
-  displacements.setZero(3, queries.cols());
-  for (int i = 0; i < network.nonrigid_iterations; ++i) {
-    network.nonrigid_source.encode(network.moved, features, network.workspace);
-    const auto decode = [&](const Points& points) {
-      network.nonrigid_decoder.decode(features, target, points, network.step, network.workspace);
-    };
-    decode(network.moved_queries);
-    displacements += network.step;
-    if (i + 1 == network.nonrigid_iterations) break;
-    network.moved_queries += network.step;
-    if (!queries_are_source) decode(network.moved);
-    network.moved += network.step;
-  }
+  network.nonrigid_decoder.decode(features, target, queries, displacements, network.workspace);
 }
 
 const Eigen::VectorXf& Network::rigidFeatures() const { return implementation_->rigid_features; }

@@ -91,14 +91,10 @@ NonRigidModuleImpl::NonRigidModuleImpl(Pairing pairing)
       target_encoder_(register_module("target_encoder", Encoder())),
       decoder_(register_module("decoder", Perceptron(nonRigidDecoderWidths(pairing), true))) {}
 
-torch::Tensor NonRigidModuleImpl::encodeTarget(const torch::Tensor& target) {
-  return target_encoder_->forward(target);
-}
-
 torch::Tensor NonRigidModuleImpl::forward(const torch::Tensor& moved_source,
-                                          const torch::Tensor& target,
-                                          const torch::Tensor& target_feature) {
-  const auto features = torch::cat({source_encoder_->forward(moved_source), target_feature}, 1);
+                                          const torch::Tensor& target) {
+  const auto features =
+      torch::cat({source_encoder_->forward(moved_source), target_encoder_->forward(target)}, 1);
   std::vector<torch::Tensor> local{moved_source};
   if (pairing_ == Pairing::kRow) local.push_back(target);
   if (pairing_ == Pairing::kNearest) {

@@ -60,13 +60,11 @@ class RigidModuleImpl : public torch::nn::Module {
 };
 TORCH_MODULE(RigidModule);
 
-/// One iteration of the non-rigid module: displacement of every point of the moved source.
+/// The non-rigid module: displacement of every point of the rigidly moved source.
 class NonRigidModuleImpl : public torch::nn::Module {
  public:
   explicit NonRigidModuleImpl(Pairing pairing);
-  torch::Tensor encodeTarget(const torch::Tensor& target);
-  torch::Tensor forward(const torch::Tensor& moved_source, const torch::Tensor& target,
-                        const torch::Tensor& target_feature);
+  torch::Tensor forward(const torch::Tensor& moved_source, const torch::Tensor& target);
 
  private:
   Pairing pairing_;

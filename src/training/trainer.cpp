@@ -45,8 +45,8 @@ int iterationsAt(const TrainingSettings& settings, std::int64_t step) {
   return std::min(settings.iterations, 1 + static_cast<int>(growth * settings.iterations));
 }
 
-/// The paper's L_total; every iteration of a module learns on the detached output of the one
-/// before, so it has seen what it will be given.
+/// The paper's L_total; every iteration of the rigid module learns on the detached output of the
+/// one before, so it has seen what it will be given.
 torch::Tensor totalLoss(Unirit& model, const Batch& batch, const TrainingSettings& settings,
                         std::int64_t step) {
   const double alpha = step < settings.rigid_steps ? 0.0 : settings.alpha;
@@ -62,14 +62,10 @@ torch::Tensor totalLoss(Unirit& model, const Batch& batch, const TrainingSetting
     rigid_loss = rigid_loss / iterations;
   }
   if (alpha == 0.0) return rigid_loss;
-  torch::Tensor global_loss = torch::zeros({}, moved.options());
-  const auto target_feature = model->nonrigid->encodeTarget(batch.target);
-  for (int i = 0; i < settings.nonrigid_iterations; ++i) {
-    moved = moved.detach();
-    moved = moved + model->nonrigid->forward(moved, batch.target, target_feature);
-    global_loss = global_loss + distance(settings.loss, moved, batch.truth, batch.target);
-  }
-  return alpha * global_loss / settings.nonrigid_iterations + (1.0 - alpha) * rigid_loss;
+  moved = moved.detach();
+  const auto deformed = moved + model->nonrigid->forward(moved, batch.target);
+  const auto global_loss = distance(settings.loss, deformed, batch.truth, batch.target);
+  return alpha * global_loss + (1.0 - alpha) * rigid_loss;
 }
 
 /// Sets the gradients of a step and returns its loss. On the CPU the batch is split over threads
@@ -144,11 +140,8 @@ ValidationErrors validate(Unirit& model, const ValidationSet& set,
       }
     }
     rigid += (rootMeanSquare(moved - part.rigid) * part.scale).sum().item<double>();
-    const auto feature = model->nonrigid->encodeTarget(part.target);
-    for (int i = 0; i < settings.nonrigid_iterations; ++i) {
-      moved = moved + model->nonrigid->forward(moved, part.target, feature);
-    }
-    final += (rootMeanSquare(moved - part.truth) * part.scale).sum().item<double>();
+    const auto deformed = moved + model->nonrigid->forward(moved, part.target);
+    final += (rootMeanSquare(deformed - part.truth) * part.scale).sum().item<double>();
   }
   return {set.protocol, rigid / static_cast<double>(count), final / static_cast<double>(count)};
 }

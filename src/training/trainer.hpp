@@ -22,7 +22,6 @@ struct TrainingSettings {
   Loss loss = Loss::kSupervised;
   double alpha = 0.5;           ///< weight of L_gl; 1 - alpha is that of L_rd (paper's L_total)
   int iterations = 4;           ///< of the rigid module while training, grown from 1
-  int nonrigid_iterations = 1;  ///< of the non-rigid module
   double learning_rate = 1e-3;  ///< Adam's; falls to a hundredth along a cosine
   std::int64_t steps = 20000;
   std::int64_t rigid_steps = 0;  ///< of them, the first ones, that train the rigid module alone

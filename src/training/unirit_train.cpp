@@ -96,10 +96,6 @@ void addOptions(CLI::App& app, Options& options) {
   app.add_option("--iterations", training.iterations, "Rigid iterations while training")
       ->check(CLI::Range(1, 32))
       ->capture_default_str();
-  app.add_option("--nonrigid-iterations", training.nonrigid_iterations,
-                 "Iterations of the non-rigid module")
-      ->check(CLI::Range(1, 32))
-      ->capture_default_str();
   app.add_option("--steps", training.steps)->check(CLI::PositiveNumber)->capture_default_str();
   app.add_option("--rigid-steps", training.rigid_steps,
                  "The first of them, that train the rigid module alone")

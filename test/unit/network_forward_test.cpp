@@ -95,22 +95,6 @@ TEST_P(NetworkForward, displacementsAgreeWithTheReferenceThatSavesNothing) {
   expectDisplacementsAgree(Pairing::kRow, source, randomPoints(203, 2), source);
 }
 
-TEST_P(NetworkForward, everyNonRigidIterationGoesOnFromTheOneBefore) {
-  const auto weights = loudWeights(Pairing::kNearest);
-  NetworkSettings settings;
-  Network once(weights, settings, 2);
-  settings.nonrigid_iterations = 2;
-  Network twice(weights, settings, 2);
-  const Points source = randomPoints(203, 1), target = randomPoints(131, 2);
-  for (const Points& queries : {randomPoints(317, 3), source}) {
-    const Points first = once.estimateDisplacements(source, target, queries);
-    const Points moved = source + once.estimateDisplacements(source, target, source);
-    const Points second = once.estimateDisplacements(moved, target, queries + first);
-    EXPECT_EQ(twice.estimateDisplacements(source, target, queries), first + second);
-    EXPECT_GT(second.cwiseAbs().maxCoeff(), 0.1F);
-  }
-}
-
 TEST_P(NetworkForward, noQueriesGiveNoDisplacements) {
   Network network(loudWeights(Pairing::kNearest), {}, 2);
   const Points cloud = randomPoints(9, 1);

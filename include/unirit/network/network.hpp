@@ -40,7 +40,7 @@ class Network {
                                   std::vector<Eigen::Isometry3f>* iterates = nullptr);
 
   /// Non-rigid module: displacement of each of `queries` (3 x Q) given the rigidly moved `source`
-  /// and `target`; each iteration goes on from where the one before left both. With pairing row, queries must be the source and of the target's size.
+  /// and `target`. With pairing row, queries must be the source and of the target's size.
   Points estimateDisplacements(const Points& source, const Points& target, const Points& queries);
 
   /// The same into `displacements`, which is resized: no memory is allocated where its size fits.
@@ -58,9 +58,9 @@ class Network {
   std::unique_ptr<Implementation> implementation_;
 };
 
-/// Multiply-adds of one forward pass, as published and with the two exact savings (target features
-/// once; the decoder's global columns once a pair and iteration).
-double multiplyAdds(Eigen::Index source_points, Eigen::Index target_points,
-                    const NetworkSettings& settings, bool with_savings);
+/// Multiply-adds of one forward pass with n rigid iterations, as published and with the two exact
+/// savings (target feature once; the decoder's global columns once per pair).
+double multiplyAdds(Eigen::Index source_points, Eigen::Index target_points, int rigid_iterations,
+                    Pairing pairing, bool with_savings);
 
 }  // namespace unirit
