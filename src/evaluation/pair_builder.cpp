@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <map>
 #include <mutex>
 #include <stdexcept>
 #include <thread>
@@ -53,7 +54,36 @@ void addCases(const Surface& surface, const OrganSource& source, int variation,
   }
 }
 
-Built buildSource(const OrganSource& source, const PairSettings& settings) {
+bool passesScreening(const OrganSource& source, const ScreeningLimits& limits) {
+  try {
+    return rejectionReason(source.load().surface, source.organ, limits).empty();
+  } catch (const std::exception&) {
+    return false;  // told when the source is built
+  }
+}
+
+/// Variations to make of each source: those asked for, and as many more as its class is short of
+/// subjects, shared out evenly among the surfaces that pass the screening.
+std::vector<int> variationsOf(const std::vector<OrganSource>& sources,
+                              const PairSettings& settings) {
+  std::vector<int> variations(sources.size(), settings.variations);
+  std::map<std::string, std::vector<std::size_t>> classes;  // of usable sources
+  for (std::size_t i = 0; i < sources.size(); ++i) {
+    auto& members = classes[sources[i].organ];
+    const bool full = static_cast<int>(members.size()) >= settings.subjects;
+    if (!full && passesScreening(sources[i], settings.limits)) members.push_back(i);
+  }
+  for (const auto& [organ, members] : classes) {
+    const int count = static_cast<int>(members.size()), missing = settings.subjects - count;
+    for (int k = 0; k < count; ++k) {
+      int& number = variations[members[static_cast<std::size_t>(k)]];
+      number = std::max(number, missing / count + (k < missing % count ? 1 : 0));
+    }
+  }
+  return variations;
+}
+
+Built buildSource(const OrganSource& source, int variations, const PairSettings& settings) {
   Built built{{source.organ, source.subject, source.name, {}, {}, 0}, {}};
   std::string which;  // what an error is about; where the file cannot be read it says so itself
   try {
@@ -63,7 +93,7 @@ Built buildSource(const OrganSource& source, const PairSettings& settings) {
     const std::string reason = rejectionReason(original, source.organ, settings.limits);
     if (!reason.empty()) throw std::runtime_error(reason);
     addCases(original, source, 0, settings, built);
-    for (int variation = 1; variation <= settings.variations; ++variation) {
+    for (int variation = 1; variation <= variations; ++variation) {
       which = source.name + ", variation " + std::to_string(variation) + ": ";
       addCases(drawVariation(original, source, variation, settings), source, variation, settings,
                built);
@@ -84,6 +114,7 @@ void validate(const PairSettings& settings) {
   require(settings.surface_samples >= 0, "settings.surface_samples: must not be negative");
   require(settings.deformations >= 1, "settings.deformations: must be positive");
   require(settings.variations >= 0, "settings.variations: must not be negative");
+  require(settings.subjects >= 0, "settings.subjects: must not be negative");
   require(settings.threads >= 1, "settings.threads: must be positive");
 }
 
@@ -92,13 +123,14 @@ void validate(const PairSettings& settings) {
 BuiltPairs buildPairs(const std::vector<OrganSource>& sources, const PairSettings& settings,
                       const std::function<void(std::size_t, std::size_t)>& progress) {
   validate(settings);
+  const std::vector<int> variations = variationsOf(sources, settings);
   std::vector<Built> built(sources.size());
   std::atomic<std::size_t> next{0};
   std::size_t done = 0;
   std::mutex mutex;
   const auto work = [&] {
     for (std::size_t i = next++; i < sources.size(); i = next++) {
-      built[i] = buildSource(sources[i], settings);
+      built[i] = buildSource(sources[i], variations[i], settings);
       const std::lock_guard lock(mutex);
       progress(++done, sources.size());
     }

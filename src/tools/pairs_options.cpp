@@ -95,6 +95,10 @@ ParsedPairsOptions parsePairsOptions(int argc, char** argv) {
                  "further anatomies made of each surface by smooth random variation")
       ->check(CLI::Range(0, 100000))
       ->capture_default_str();
+  app.add_option("--subjects", settings.subjects,
+                 "classes of fewer surfaces are filled up with varied anatomies")
+      ->check(CLI::Range(0, 100000))
+      ->capture_default_str();
   app.add_option("--seed", settings.seed, "of everything drawn")->capture_default_str();
   app.add_option("--threads", settings.threads, "the set has the same bits for any number")
       ->check(CLI::Range(1, 256))

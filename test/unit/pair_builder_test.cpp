@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <map>
 #include <set>
 #include <stdexcept>
 
@@ -86,6 +87,25 @@ TEST(PairBuilder, CountsVariationsAndDeformations) {
   EXPECT_EQ(counted, "0.0 0.1 1.0 1.1 ");
   EXPECT_NE(extent(pairs.set.cases[0].seen.points.source),
             extent(pairs.set.cases[2].seen.points.source));
+}
+
+TEST(PairBuilder, FillsUpClassesThatHaveFewSubjects) {
+  PairSettings balanced = settings();
+  balanced.deformations = 1;
+  balanced.variations = 0;
+  balanced.subjects = 4;
+  OrganSource small = source("gallbladder", 0);
+  small.organ = "liver";  // rejected, so it counts for nothing
+  std::vector<OrganSource> sources{small, source("liver", 1), source("liver", 2),
+                                   source("liver", 3), source("kidney", 1)};
+  for (int patient = 0; patient < 5; ++patient) sources.push_back(source("spleen", patient));
+  std::map<std::string, std::string> counted;
+  for (const PairSetCase& one : build(sources, balanced).set.cases) {
+    counted[one.organ] += one.subject + "." + std::to_string(one.variation) + " ";
+  }
+  EXPECT_EQ(counted["liver"], "1.0 1.1 2.0 3.0 ");
+  EXPECT_EQ(counted["kidney"], "1.0 1.1 1.2 1.3 ");
+  EXPECT_EQ(counted["spleen"], "0.0 1.0 2.0 3.0 4.0 ");
 }
 
 TEST(PairBuilder, ListsWhatItLeavesOutAndGoesOn) {

@@ -30,6 +30,7 @@ struct PairSettings {
   Eigen::Index surface_samples = 20000;  ///< of the true surface, kept for the metrics
   int deformations = 1;                  ///< of each surface
   int variations = 0;                    ///< further anatomies made from each surface
+  int subjects = 0;                      ///< of each class, at least, varied anatomies counted
   std::uint64_t seed = 1;
   int threads = 1;
   ScreeningLimits limits;
@@ -49,8 +50,9 @@ struct BuiltPairs {
 
 /// Screens each source, varies and deforms it, and sees it under every protocol. A case's seed
 /// comes from the settings' seed, the source's name, variation and deformation alone: the set has
-/// the same bits for any number of threads, and other sources do not change it. `progress` is told
-/// how many sources of how many are done, by one thread at a time.
+/// the same bits for any number of threads, and other sources do not change a case; they may change
+/// how many variations it takes to give a class its subjects. `progress` is told how many sources
+/// of how many are done, by one thread at a time.
 BuiltPairs buildPairs(const std::vector<OrganSource>& sources, const PairSettings& settings,
                       const std::function<void(std::size_t, std::size_t)>& progress);
 
