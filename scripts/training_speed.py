@@ -1,0 +1,232 @@
+#!/usr/bin/python3
+# SPDX-License-Identifier: BSD-3-Clause
+"""Usage: training_speed.py UNIRIT_TRAIN [--cores N...] [--batch N] [--points N] [--steps N]
+       [--iterations N] [--repeats N]
+
+Trains the network by UNIRIT_TRAIN and by python's torch in turn, on the same cores, and prints a
+Markdown table of the medians of their speeds, in pairs a second of the clock and a second of a
+core's time, which other work on the machine disturbs less: once the rigid module alone, once both
+modules. The python side has the same layers, batch, points, loss, rigid iterations and optimiser
+step, and the savings that a user of torch can write down: the target's rigid feature once a pair,
+the decoder's global columns once a pair. Its clouds lie ready in memory; unirit_train makes its
+pairs meanwhile, on the same cores.
+
+Needs Debian's python3-torch, which nothing else here does, so it is not in packages.txt.
+"""
+import argparse
+import csv
+import os
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+
+ENCODER = [3, 64, 64, 64, 128, 1024]
+RIGID_DECODER = [2048, 1024, 1024, 512, 512, 256, 7]
+NONRIGID_DECODER = [2054, 1024, 512, 256, 128, 64, 3]
+PARAMETERS = 7466122
+PHASES = {"rigid": 0.0, "both": 0.5}  # weights of the global loss
+
+
+def environment(cores):
+    """OpenBLAS 0.3.21 does not know recent processors, and takes its slowest kernels there. Threads
+    of OpenMP that wait busily would keep those of OpenBLAS from the cores."""
+    with open("/proc/cpuinfo", encoding="utf-8") as file:
+        flags = file.read().split()
+    kernels = {"OPENBLAS_CORETYPE": "SkylakeX"} if "avx512bw" in flags else \
+        {"OPENBLAS_CORETYPE": "Haswell"} if "avx2" in flags else {}
+    return dict(os.environ, OMP_NUM_THREADS=str(cores), OMP_WAIT_POLICY="passive", **kernels)
+
+
+def start_on(cores, command, **variables):
+    os.sched_setaffinity(0, cores)  # inherited by the command
+    return subprocess.Popen(command, env=dict(environment(len(cores)), **variables),
+                            stdout=subprocess.PIPE, text=True)
+
+
+def processor_seconds(process):
+    """Of all its threads so far."""
+    with open(f"/proc/{process.pid}/stat", encoding="utf-8") as file:
+        fields = file.read().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+def rows_of(path):
+    try:
+        with open(path, encoding="utf-8") as file:
+            return list(csv.DictReader(file))
+    except FileNotFoundError:
+        return []
+
+
+def speed_of_unirit(options, phase, cores):
+    """Pairs a second, and a second of a core, once the rigid iterations have grown: of the second
+    and third row. A core's time includes that of two validations, a few percent."""
+    with tempfile.TemporaryDirectory() as folder:
+        curves = os.path.join(folder, "curves.csv")
+        with start_on(cores, [
+                options.unirit_train, "--phantoms", "1", "--output", folder, "--threads",
+                str(len(cores)), "--alpha", str(PHASES[phase]), "--batch", str(options.batch),
+                "--points", str(options.points), "--iterations", str(options.iterations),
+                "--steps", str(3 * options.steps), "--report-every", str(options.steps)]) as train:
+            used = []
+            while len(used) < 3 and train.poll() is None:
+                if len(rows_of(curves)) > len(used):
+                    used.append(processor_seconds(train))
+                time.sleep(0.01)
+            train.communicate()
+        if train.returncode != 0 or len(used) < 3:
+            sys.exit("unirit_train failed, or was too fast to be watched: take more --steps")
+        rows = rows_of(curves)
+    pairs = 2 * options.steps * options.batch
+    return (statistics.harmonic_mean([float(row["pairs_per_second"]) for row in rows[1:]]),
+            pairs / (used[2] - used[0]))
+
+
+def speed_of_torch(options, phase, cores):
+    with start_on(cores, [
+            sys.executable, os.path.abspath(__file__), options.unirit_train, "--torch", phase,
+            "--cores", str(len(cores)), "--batch", str(options.batch), "--points",
+            str(options.points), "--steps", str(options.steps), "--iterations",
+            str(options.iterations)], OPENBLAS_NUM_THREADS=str(len(cores))) as train:
+        output = train.stdout.read()
+    if train.returncode != 0:
+        sys.exit("python's torch failed")
+    return tuple(float(number) for number in output.split())
+
+
+def train_with_torch(options):
+    """Prints pairs a second, and a second of a core, after a third as many steps to warm up."""
+    import torch  # pylint: disable=import-outside-toplevel
+    from torch import nn  # pylint: disable=import-outside-toplevel
+
+    def layers(widths):
+        made = nn.ModuleList(nn.Linear(*pair) for pair in zip(widths, widths[1:]))
+        for layer in made:
+            nn.init.kaiming_normal_(layer.weight, nonlinearity="relu")
+            nn.init.zeros_(layer.bias)
+        return made
+
+    def run_layers(made, values):
+        for layer in made[:-1]:
+            values = torch.relu(layer(values))
+        return made[-1](values)
+
+    class Encoder(nn.Module):
+        def __init__(self):
+            super().__init__()
+            self.layers = layers(ENCODER)
+
+        def forward(self, points):  # the maximum commutes with the ReLU
+            return torch.relu(run_layers(self.layers, points).max(1).values)
+
+    class Rigid(nn.Module):
+        def __init__(self):
+            super().__init__()
+            self.source, self.target, self.decoder = Encoder(), Encoder(), layers(RIGID_DECODER)
+            self.decoder[-1].weight.data *= 0.05
+            self.decoder[-1].bias.data[0] = 1.0
+
+        def forward(self, moved, feature):
+            output = run_layers(self.decoder, torch.cat([self.source(moved), feature], 1))
+            w, x, y, z = nn.functional.normalize(output[:, :4]).unbind(1)
+            rotation = torch.stack(
+                [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y),
+                 2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x),
+                 2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)], 1)
+            rotation = rotation.view(-1, 3, 3)
+            return torch.baddbmm(output[:, 4:].unsqueeze(1), moved, rotation.transpose(1, 2))
+
+    class NonRigid(nn.Module):
+        def __init__(self):
+            super().__init__()
+            self.source, self.target, self.decoder = Encoder(), Encoder(), layers(NONRIGID_DECODER)
+
+        def forward(self, moved, target):
+            features = torch.cat([self.source(moved), self.target(target)], 1)
+            with torch.no_grad():
+                index = torch.cdist(moved, target).argmin(2)
+            offset = target.gather(1, index.unsqueeze(2).expand(-1, -1, 3)) - moved
+            first = self.decoder[0]
+            point, columns, pairing = first.weight.split([3, 2048, 3], 1)
+            values = nn.functional.linear(torch.cat([moved, offset], 2),
+                                          torch.cat([point, pairing], 1))
+            values = values + nn.functional.linear(features, columns, first.bias).unsqueeze(1)
+            return run_layers(self.decoder[1:], torch.relu(values))
+
+    def root_mean_square(offsets):
+        return (offsets.square().sum(2).mean(1) + 1e-12).sqrt().mean()
+
+    torch.set_num_threads(options.cores[0])
+    torch.manual_seed(1)
+    alpha = PHASES[options.torch]
+    network = nn.ModuleDict({"rigid": Rigid(), "nonrigid": NonRigid()})
+    assert sum(p.numel() for p in network.parameters()) == PARAMETERS
+    optimiser = torch.optim.Adam(network.parameters(), 1e-3)
+    source, target, truth, rigid = torch.rand(4, options.batch, options.points, 3) * 2 - 1
+
+    def step():
+        optimiser.zero_grad()
+        moved, loss = source, 0.0
+        feature = network["rigid"].target(target)
+        for _ in range(options.iterations):
+            moved = network["rigid"](moved.detach(), feature)
+            loss = loss + (1 - alpha) * root_mean_square(moved - rigid) / options.iterations
+        if alpha > 0.0:
+            moved = moved.detach()
+            deformed = moved + network["nonrigid"](moved, target)
+            loss = loss + alpha * root_mean_square(deformed - truth)
+        loss.backward()
+        nn.utils.clip_grad_norm_(network.parameters(), 1.0)
+        optimiser.step()
+        return loss.item()
+
+    for _ in range(options.steps // 3 + 1):
+        step()
+    start, start_used = time.perf_counter(), time.process_time()
+    for _ in range(options.steps):
+        step()
+    pairs = options.steps * options.batch
+    print(pairs / (time.perf_counter() - start), pairs / (time.process_time() - start_used))
+
+
+def compare(options):
+    every_core = sorted(os.sched_getaffinity(0))
+    print(f"{options.batch} pairs a step, {options.points} points, {options.iterations} rigid "
+          f"iterations; medians of {options.repeats}\n")
+    print("| cores | modules trained | unirit_train: pairs/s (steps/s) | pairs per core-second "
+          "| python torch: pairs/s (steps/s) | pairs per core-second | ratio | per core-second |")
+    print("|---|---|---|---|---|---|---|---|")
+    for count in options.cores:
+        cores = every_core[:count]
+        for phase in PHASES:
+            speeds = [speed_of_torch(options, phase, cores) + speed_of_unirit(options, phase, cores)
+                      for _ in range(options.repeats)]
+            torch, torch_core, unirit, unirit_core = map(statistics.median, zip(*speeds))
+            print(f"| {count} | {phase} | {unirit:.1f} ({unirit / options.batch:.2f}) "
+                  f"| {unirit_core:.1f} | {torch:.1f} ({torch / options.batch:.2f}) "
+                  f"| {torch_core:.1f} | {unirit / torch:.2f} | {unirit_core / torch_core:.2f} |",
+                  flush=True)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("unirit_train")
+    parser.add_argument("--cores", type=int, nargs="+", default=[1, 2])
+    parser.add_argument("--batch", type=int, default=32)
+    parser.add_argument("--points", type=int, default=256)
+    parser.add_argument("--steps", type=int, default=20, help="measured; as many warm up")
+    parser.add_argument("--iterations", type=int, default=4)
+    parser.add_argument("--repeats", type=int, default=3)
+    parser.add_argument("--torch", choices=PHASES, help=argparse.SUPPRESS)
+    options = parser.parse_args()
+    if options.torch:
+        train_with_torch(options)
+    else:
+        compare(options)
+
+
+if __name__ == "__main__":
+    main()
