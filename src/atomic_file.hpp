@@ -12,4 +12,8 @@ namespace unirit {
 void writeAtomically(const std::string& path, const std::string& what,
                      const std::function<void(std::ostream&)>& write);
 
+/// Throws std::runtime_error "PATH cannot be written" where it could not be, its folder made or
+/// not: known before the work rather than after it.
+void requirePlaceFor(const std::string& path);
+
 }  // namespace unirit

@@ -14,6 +14,7 @@
 #include <stdexcept>
 #include <thread>
 
+#include "../atomic_file.hpp"
 #include "benchmark_cases.hpp"
 #include "unirit/evaluation/method_factory.hpp"
 #include "unirit/io/surface_io.hpp"
@@ -62,13 +63,15 @@ class Run {
  public:
   explicit Run(const BenchmarkOptions& options)
       : options_(options), machine_(machineName()), factory_(options.weights) {
-    std::filesystem::create_directories(options.output);
+    requirePlaceFor(options.output + "/tables.md");
     for (const std::string& method : options.methods) methods_.emplace_back(method);
     const std::vector<BenchmarkCase> all = benchmarkCases(options);
     for (std::size_t i = 0; i < all.size(); ++i) {
       const auto shard = i % static_cast<std::size_t>(options.shards) + 1;
       if (shard == static_cast<std::size_t>(options.shard)) cases_.push_back(all[i]);
     }
+    for (const Described& method : methods_) factory_.make(method.description, all.front().kind);
+    std::filesystem::create_directories(options.output);
     const auto rows = readRecords(options.recordsPath());
     for (const BenchmarkRecord& record : rows) known_.emplace(record.key(), record);
     writeRecords(rows, options.recordsPath());

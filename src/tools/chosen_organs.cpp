@@ -3,6 +3,7 @@
 
 #include <iostream>
 
+#include "unirit/evaluation/deformable_organs.hpp"
 #include "unirit/simulation/phantom.hpp"
 
 namespace unirit {
@@ -16,7 +17,7 @@ constexpr std::uint64_t kUnseenPatients = 900000000;  // phantom seeds that trai
 std::vector<Organ> chosenOrgans(const std::string& data, const std::vector<std::string>& exclude,
                                 int phantoms) {
   if (!data.empty()) {
-    return readOrgans(data, kMillimetre, exclude, [](const std::string& sentence) {
+    return readDeformableOrgans(data, kMillimetre, exclude, [](const std::string& sentence) {
       std::cerr << "left out: " << sentence << '\n';
     });
   }

@@ -81,14 +81,6 @@ void requireDistinctNames(const std::vector<OrganSource>& sources) {
   }
 }
 
-/// Known before the work rather than after it.
-void requirePlaceFor(const std::string& path) {
-  fs::path folder = fs::absolute(path).parent_path();
-  while (!fs::exists(folder)) folder = folder.parent_path();
-  const bool usable = fs::is_directory(folder) && ::access(folder.c_str(), W_OK | X_OK) == 0;
-  if (!usable || fs::is_directory(path)) throw std::runtime_error(path + " cannot be written");
-}
-
 /// A line that is written over on a terminal, and every ten seconds elsewhere.
 class ProgressLine {
  public:

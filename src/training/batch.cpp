@@ -142,14 +142,15 @@ BatchQueue::~BatchQueue() {
 
 Batch BatchQueue::next() {
   std::unique_lock lock(mutex_);
-  changed_.wait(lock, [this] { return ready_.count(next_taken_) > 0; });
+  changed_.wait(lock, [this] { return fault_ || ready_.count(next_taken_) > 0; });
+  if (fault_) std::rethrow_exception(fault_);
   Batch batch = std::move(ready_.extract(next_taken_).mapped());
   ++next_taken_;
   changed_.notify_all();
   return batch;
 }
 
-void BatchQueue::work() {
+void BatchQueue::work() try {
   std::unique_lock lock(mutex_);
   while (true) {
     changed_.wait(lock, [this] { return stopping_ || next_made_ - next_taken_ < ahead_; });
@@ -161,6 +162,10 @@ void BatchQueue::work() {
     ready_.emplace(index, std::move(batch));
     changed_.notify_all();
   }
+} catch (...) {
+  const std::lock_guard lock(mutex_);
+  fault_ = std::current_exception();
+  changed_.notify_all();
 }
 
 }  // namespace unirit::training

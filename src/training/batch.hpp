@@ -5,6 +5,7 @@
 
 #include <condition_variable>
 #include <cstdint>
+#include <exception>
 #include <map>
 #include <mutex>
 #include <string>
@@ -49,7 +50,8 @@ Batch makeBatch(const std::vector<Organ>& organs, const BatchSettings& settings,
 Batch makeValidation(const std::vector<Organ>& organs, Protocol protocol, std::int64_t per_organ,
                      std::int64_t points, std::uint64_t seed);
 
-/// Makes batches ahead of the trainer, in order, on its own threads.
+/// Makes batches ahead of the trainer, in order, on its own threads. What goes wrong there is
+/// thrown by next().
 class BatchQueue {
  public:
   BatchQueue(const std::vector<Organ>& organs, const BatchSettings& settings, std::uint64_t seed,
@@ -68,6 +70,7 @@ class BatchQueue {
   std::mutex mutex_;
   std::condition_variable changed_;
   std::map<std::int64_t, Batch> ready_;
+  std::exception_ptr fault_;  // of a thread, for next() to throw
   std::int64_t next_made_, next_taken_;
   bool stopping_ = false;
   std::vector<std::thread> threads_;

@@ -117,6 +117,11 @@ UniritImpl::UniritImpl(Pairing pairing)
       pairing_(pairing) {}
 
 void UniritImpl::setWeights(const Weights& weights) {
+  if (weights.pairing != pairing_) {
+    throw std::invalid_argument(std::string("weights: their pairing is ") +
+                                toString(weights.pairing) + ", the network's " +
+                                toString(pairing_));
+  }
   const torch::NoGradGuard no_grad;
   auto parameters = named_parameters();
   for (const LayerShape& shape : layerShapes(pairing_)) {

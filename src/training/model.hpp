@@ -81,11 +81,14 @@ class UniritImpl : public torch::nn::Module {
   RigidModule rigid;
   NonRigidModule nonrigid;
 
-  /// Replaces every parameter; throws std::invalid_argument where a layer is missing.
+  /// Replaces every parameter; throws std::invalid_argument where the pairing is another or a layer
+  /// is missing.
   void setWeights(const Weights& weights);
 
   /// The parameters as a weights file holds them, without metadata.
   Weights weights() const;
+
+  Pairing pairing() const { return pairing_; }
 
  private:
   Pairing pairing_;

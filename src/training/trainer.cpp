@@ -164,6 +164,7 @@ class Checkpoint {
     optimiser.save(state);
     archive.write("network", network);
     archive.write("optimiser", state);
+    archive.write("pairing", torch::tensor(static_cast<int>(model->pairing())));
     archive.write("step", torch::tensor(step));
     archive.write("seconds", torch::tensor(seconds, torch::kFloat64));
     const std::filesystem::path fresh = path_.string() + ".new";
@@ -177,8 +178,12 @@ class Checkpoint {
     if (!std::filesystem::exists(path_)) return false;
     try {
       torch::serialize::InputArchive archive, network, state;
-      torch::Tensor saved_step, saved_seconds;
+      torch::Tensor saved_pairing, saved_step, saved_seconds;
       archive.load_from(path_.string());
+      archive.read("pairing", saved_pairing);
+      if (saved_pairing.item<int>() != static_cast<int>(model->pairing())) {
+        throw std::runtime_error(path_.string() + ": its network's pairing is another");
+      }
       archive.read("network", network);
       archive.read("optimiser", state);
       archive.read("step", saved_step);

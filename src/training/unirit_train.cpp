@@ -10,8 +10,9 @@
 #include <map>
 #include <thread>
 
+#include "../atomic_file.hpp"
 #include "trainer.hpp"
-#include "unirit/io/organ_folder.hpp"
+#include "unirit/evaluation/deformable_organs.hpp"
 #include "unirit/simulation/anatomical_variation.hpp"
 #include "unirit/simulation/phantom.hpp"
 
@@ -28,7 +29,7 @@ struct Options {
   std::vector<std::string> exclude{"small_bowel"};
   int phantoms = 0;
   int hold_out = 12;
-  int variations = 0;
+  int subjects = 0;
   std::string output;
   std::string start_from;
   std::string method = "unirit";
@@ -61,7 +62,7 @@ void addOptions(CLI::App& app, Options& options) {
       ->capture_default_str();
   app.add_option("--phantoms", options.phantoms, "Digital phantoms of each organ to train on too")
       ->check(CLI::Range(0, 10000));
-  app.add_option("--variations", options.variations,
+  app.add_option("--subjects", options.subjects,
                  "Classes of fewer organs are filled up to this many with varied anatomies of "
                  "theirs")
       ->check(CLI::Range(0, 10000))
@@ -149,9 +150,9 @@ void addOptions(CLI::App& app, Options& options) {
 std::vector<Organ> organsOf(const Options& options) {
   std::vector<Organ> organs;
   for (const std::string& folder : options.data) {
-    for (Organ& organ : readOrgans(folder, kMillimetre, options.exclude, [](const auto& sentence) {
-           std::cerr << "left out: " << sentence << '\n';
-         })) {
+    for (Organ& organ : readDeformableOrgans(
+             folder, kMillimetre, options.exclude,
+             [](const auto& sentence) { std::cerr << "left out: " << sentence << '\n'; })) {
       organs.push_back(std::move(organ));
     }
   }
@@ -179,8 +180,8 @@ std::pair<std::vector<Organ>, std::vector<Organ>> split(std::vector<Organ> organ
   return {std::move(kept), std::move(held_out)};
 }
 
-/// Varied anatomies of a class's organs in turn, up to `least` organs a class.
-void addVariations(std::vector<Organ>& organs, int least, std::uint64_t seed) {
+/// Classes of fewer than `least` organs get varied anatomies of theirs, in turn.
+void fillUp(std::vector<Organ>& organs, int least, std::uint64_t seed) {
   std::map<std::string, std::vector<Organ>> classes;
   for (const Organ& organ : organs) classes[organ.name].push_back(organ);
   for (const auto& [name, originals] : classes) {
@@ -222,18 +223,20 @@ void run(Options& options) {
     at::globalContext().setAllowTF32CuBLAS(true);  // ten mantissa bits, several times as fast
   }
   if (training.threads > 1) torch::set_num_threads(1);
-  auto [organs, validation] = split(organsOf(options), options.hold_out);
-  addVariations(organs, options.variations, training.seed);
-  std::printf("training on %zu organs, validating on %zu\n", organs.size(), validation.size());
-  std::printf(
-      "of every validation protocol: rigid stage to the best rigid fit, final to the truth\n");
-
+  const std::filesystem::path output = options.output;
+  requirePlaceFor((output / "unirit.safetensors").string());
   Unirit model(training.pairing);
   model->setWeights(options.start_from.empty()
                         ? randomWeights(training.pairing, static_cast<unsigned>(training.seed))
                         : readWeights(options.start_from));
+  auto [organs, validation] = split(organsOf(options), options.hold_out);
+  fillUp(organs, options.subjects, training.seed);
+  std::printf("training on %zu organs, validating on %zu\n", organs.size(), validation.size());
+  std::printf(
+      "of every validation protocol: rigid stage to the best rigid fit, final to the truth\n");
+
   Progress last;
-  model = train(organs, validation, training, options.output, model, [&](const Progress& progress) {
+  model = train(organs, validation, training, output, model, [&](const Progress& progress) {
     printProgress(progress);
     last = progress;
   });
@@ -248,7 +251,7 @@ void run(Options& options) {
     weights.metadata[name + "_rigid_mm"] = std::to_string(1000.0 * errors.rigid);
     weights.metadata[name + "_final_mm"] = std::to_string(1000.0 * errors.final);
   }
-  const std::filesystem::path path = std::filesystem::path(options.output) / "unirit.safetensors";
+  const std::filesystem::path path = output / "unirit.safetensors";
   writeWeights(weights, path);
   std::printf("wrote %s\n", path.c_str());
 }

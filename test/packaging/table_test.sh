@@ -67,6 +67,8 @@ ellipsoid 200 >organs/train/s0001_liver.stl
 ellipsoid 220 >organs/train/000002_Liver.stl
 ellipsoid 210 >organs/test/liver/3.stl
 head -n 100 organs/train/s0001_liver.stl >broken/s0004_liver.stl
+mkdir flat
+sed -E 's/^vertex .*/vertex 0 0 0/' organs/train/s0001_liver.stl >flat/flat_liver.stl
 mapfile -t commands < <(shownCommands)
 
 claim "the README shows three commands" [ "${#commands[@]}" == 3 ]
@@ -94,6 +96,10 @@ done
 claim "unirit_pairs names a broken mesh" \
   refuses 'Cannot read "broken/s0004_liver.stl"' unirit_pairs --data broken --output out/pairs
 touch file
+claim "unirit_train refuses an output that is a file" \
+  refuses "file/unirit.safetensors cannot be written" unirit_train --phantoms 1 --output file
+claim "unirit_train leaves out a mesh without area" \
+  refuses "left out: liver flat_liver: cannot be deformed" unirit_train --data flat --output out
 claim "unirit_pairs refuses an output below a file" \
   refuses "file/pairs cannot be written" unirit_pairs --data organs --output file/pairs
 claim "unirit_benchmark refuses pairs that are not there" \

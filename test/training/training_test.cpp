@@ -79,6 +79,7 @@ TEST(Model, WeightsRoundTrip) {
   Weights incomplete = weights;
   incomplete.layers.erase("rigid.decoder.0");
   EXPECT_THROW(model->setWeights(incomplete), std::invalid_argument);
+  EXPECT_THROW(model->setWeights(randomWeights(Pairing::kNone, 2)), std::invalid_argument);
 }
 
 TEST_F(Training, BatchesDependOnSeedAndNumberAlone) {
@@ -89,6 +90,12 @@ TEST_F(Training, BatchesDependOnSeedAndNumberAlone) {
   BatchQueue queue(organs_, settings_.batch, 1, 4, 3);
   queue.next();
   EXPECT_TRUE(torch::equal(queue.next().target, a.target));
+}
+
+TEST_F(Training, QueuesPassOnWhatGoesWrong) {
+  const Organ flat{"liver", "2", {{Points::Zero(3, 3), Points()}, Eigen::Matrix3Xi::Zero(3, 1)}};
+  BatchQueue queue({flat}, settings_.batch, 1, 0, 2);
+  EXPECT_THROW(queue.next(), std::invalid_argument);
 }
 
 TEST_F(Training, BatchesAreNormalisedAndTheBestRigidFitIsNearerThanNone) {
@@ -178,20 +185,25 @@ TEST_F(Training, LeavesTheRigidModuleAloneWhereAlphaIsOneAndTheOtherWhereItIsZer
   }
 }
 
-TEST_F(Training, WritesCurvesAndRefusesDamagedCheckpoints) {
+TEST_F(Training, WritesCurvesAndRefusesDamagedAndOtherCheckpoints) {
   trained(settings_, folder_);
   std::ifstream curves(folder_ / "curves.csv");
   std::string line;
   int lines = 0;
   while (std::getline(curves, line)) ++lines;
   EXPECT_EQ(lines, 1 + 2);
+  const auto expectRefused = [&](const std::string& sentence) {
+    try {
+      trained(settings_, folder_);
+      FAIL() << "the checkpoint was taken";
+    } catch (const std::runtime_error& error) {
+      EXPECT_NE(std::string(error.what()).find(sentence), std::string::npos) << error.what();
+    }
+  };
+  settings_.pairing = Pairing::kRow;
+  expectRefused("checkpoint.pt: its network's pairing is another");
   std::ofstream(folder_ / "checkpoint.pt") << "not a checkpoint";
-  try {
-    trained(settings_, folder_);
-    FAIL() << "a damaged checkpoint was taken";
-  } catch (const std::runtime_error& error) {
-    EXPECT_NE(std::string(error.what()).find("checkpoint.pt"), std::string::npos);
-  }
+  expectRefused("checkpoint.pt: not a checkpoint");
 }
 
 }  // namespace

@@ -208,7 +208,7 @@ TEST_F(BenchmarkTool, RefusesFaultyRequestsInASentence) {
     EXPECT_EQ(run(arguments), 2) << arguments;
     EXPECT_NE(text("stderr").find(words), std::string::npos) << text("stderr");
   };
-  const std::string phantoms = "--phantoms 1 --points 64 ";
+  const std::string phantoms = "--phantoms 1 --points 64 --output new ";
   refuses("", "one of --data, --phantoms, --cases, --merge");
   refuses(phantoms + "--methods cdp", "unknown");
   refuses(phantoms + "--methods unirit", "needs weights");
@@ -217,10 +217,13 @@ TEST_F(BenchmarkTool, RefusesFaultyRequestsInASentence) {
     refuses(phantoms + "--methods identity --protocols " + share, std::string("'") + share + "'");
   }
   refuses(phantoms + "--shard 3/2", "--shard");
-  refuses("--cases nowhere --methods identity", "nowhere");
+  refuses("--cases nowhere --methods identity --output new", "nowhere");
+  EXPECT_FALSE(fs::exists(folder_ / "new")) << "nothing is written";
   fs::create_directories(folder_ / "bad");
   overwrite("bad/cases.csv", "something else\n");
-  refuses(phantoms + "--methods identity --output bad", "bad/cases.csv");
+  const std::string small = "--phantoms 1 --points 64 --methods identity --output ";
+  refuses(small + "bad", "bad/cases.csv");
+  refuses(small + "bad/cases.csv", "bad/cases.csv/tables.md cannot be written");
 }
 
 }  // namespace
