@@ -43,8 +43,8 @@ struct NetworkSettings {
 /// The coherent refinement. Lengths scale with the organ.
 struct RefinementSettings {
   Correspondence correspondence = Correspondence::kSurface;
-  int pose_iterations = 40;  ///< of the pose alone, with few points
-  int iterations = 24;       ///< of pose and displacement
+  int pose_iterations = 16;  ///< of the pose alone, with few points
+  int iterations = 16;       ///< of pose and displacement, half of them with few points
   int warm_iterations = 8;   ///< of both, where they begin at the registration before
   double last_sigma = 0.02;  ///< deviation of the cloud from the surface at the end, over the
                              ///< organ's half extent

@@ -160,7 +160,7 @@ void CoherentSolver::solvePose(const Correspondences& correspondences, const Tru
 }
 
 void CoherentSolver::solve(const Correspondences& correspondences, const Trust& trust,
-                           CoherentState& state) {
+                           CoherentState& state, float stride) {
   moved_ = source_ + state.displacements;
   weigh(correspondences, trust, state, source_);
   multiply();
@@ -170,11 +170,17 @@ void CoherentSolver::solve(const Correspondences& correspondences, const Trust& 
   factor_.compute(matrix_);
   factor_.solveInPlace(unknowns_);
   for (int axis = 0; axis < 3; ++axis) {
-    state.coefficients.row(axis) = unknowns_.segment(axis * rank(), rank()).transpose();
+    auto coefficients = state.coefficients.row(axis);
+    coefficients += stride * (unknowns_.segment(axis * rank(), rank()).transpose() - coefficients);
   }
-  state.displacements.noalias() = state.coefficients * functions_;
+  displace(state);
+  unknowns_.tail<kPose>() *= stride;
   movePose(pose, state);
   learnDeviations(state);
+}
+
+void CoherentSolver::displace(CoherentState& state) const {
+  state.displacements.noalias() = state.coefficients * functions_;
 }
 
 Eigen::MatrixXf CoherentSolver::covarianceFactor() const {

@@ -43,8 +43,12 @@ class CoherentSolver {
   /// Moves the pose alone; the displacement stays as it is.
   void solvePose(const Correspondences& correspondences, const Trust& trust, CoherentState& state);
 
-  /// Moves pose and displacement.
-  void solve(const Correspondences& correspondences, const Trust& trust, CoherentState& state);
+  /// Moves pose and displacement, `stride` times as far as the least squares lie.
+  void solve(const Correspondences& correspondences, const Trust& trust, CoherentState& state,
+             float stride = 1.0F);
+
+  /// Makes the displacements those of the coefficients.
+  void displace(CoherentState& state) const;
 
   /// Forgets what was learnt of the pose's deviations, begins anew from these.
   void restart(const PosePrior& prior) { prior_ = deviations_ = prior; }

@@ -20,13 +20,14 @@ constexpr int kRank = 48;
 // A view tells little of the pose, a whole surface nearly all
 constexpr PosePrior kViewPose{0.07F, 0.035F};
 constexpr PosePrior kWholePose{0.2F, 0.1F};
-constexpr Eigen::Index kCoarsePoints = 256;  // where the pose alone is sought
-constexpr float kWidestSigma = 0.4F;         // where that begins
-constexpr float kNarrowSigma = 0.06F;        // and ends
-constexpr float kFirstSigma = 0.12F;         // where pose and displacement are sought from afar
-constexpr float kNearSigma = 0.04F;          // and where the search begins near its end
-constexpr float kWholeSharpness = 0.75F;     // last sigma of a whole surface over that of a view
-constexpr float kSurfaceAcross = 0.3F;  // deviation along the surface, which geometry hardly sees
+constexpr Eigen::Index kCoarsePoints = 384;  // where the search begins afar
+constexpr float kWidestSigma = 0.4F;         // where the pose alone is sought
+constexpr float kFirstSigma = 0.12F;         // where pose and displacement are sought
+constexpr float kNarrowSigma = 0.06F;        // where either ends that has few points
+constexpr float kNearSigma = 0.04F;          // where the search begins near its end
+constexpr float kStride = 1.8F;           // of all iterations of both but the last: over-relaxation
+constexpr float kWholeSharpness = 0.75F;  // last sigma of a whole surface over that of a view
+constexpr float kSurfaceAcross = 0.3F;    // deviation along the surface, which geometry hardly sees
 constexpr float kPointsAcross = 0.01F;
 constexpr int kPointsPatience = 2;  // times the iterations: points are told apart late
 constexpr float kSurfaceWeight = 0.4F;
@@ -134,45 +135,63 @@ Refinement::Refinement(const PointCloud& source, const RefinementSettings& setti
       solver_(source.points, prior_->functions(source.points), kViewPose, kernels, team),
       coarse_solver_(coarse_.points, prior_->functions(coarse_.points), kViewPose, kernels, team) {}
 
-Trust Refinement::trust(float sigma, float across) const {
+Trust Refinement::trust(float sigma) const {
   const bool points = settings_.correspondence == Correspondence::kPoints;
+  const float across = points ? kPointsAcross : kSurfaceAcross;
   return {sigma, std::hypot(across, sigma), points ? 1.0F : kSurfaceWeight};
 }
 
-/// The pose alone, with few points, from wide to narrow.
-Eigen::Isometry3f Refinement::findPose(const Sighting& sighting, const PosePrior& prior,
-                                       const SearchStart& start) {
+/// With few points, from wide to narrow: the pose alone, then `iterations` of both.
+CoherentState Refinement::searchCoarsely(const Sighting& sighting, const PosePrior& prior,
+                                         const SearchStart& start, int iterations) {
   const Sighting coarse{pick(sighting.seen, sampleEvenly(sighting.seen.points, kCoarsePoints)),
                         sighting.whole, sighting.eye};
   Expectation expectation(coarse_, coarse, *this);
   coarse_solver_.restart(prior);
-  CoherentState state{start.pose, {}, select(start.displacements, coarse_samples_)};
+  CoherentState state{start.pose, Eigen::Matrix3Xf::Zero(3, solver_.rank()),
+                      select(start.displacements, coarse_samples_)};
   const int steps = settings_.pose_iterations;
   for (int step = 0; step < steps; ++step) {
     const float sigma = annealed(kWidestSigma, kNarrowSigma, step, steps);
-    coarse_solver_.solvePose(expectation.at(state, sigma), trust(sigma, 0.0F), state);
+    coarse_solver_.solvePose(expectation.at(state, sigma), {sigma, sigma, kSurfaceWeight}, state);
   }
-  return state.pose;
+  for (int step = 0; step < iterations; ++step) {
+    const float sigma = annealed(kFirstSigma, kNarrowSigma, step, iterations);
+    Trust each = trust(sigma);
+    each.weight *= static_cast<float>(source_.size()) / static_cast<float>(coarse_.size());
+    coarse_solver_.solve(expectation.at(state, sigma), each, state, kStride);
+  }
+  return state;
 }
 
 Refined Refinement::refine(const PointCloud& target, const SearchStart& start) {
   const Sighting sighting = sightingOf(target, area_);
   const bool points = settings_.correspondence == Correspondence::kPoints;
   const PosePrior prior = sighting.whole ? kWholePose : kViewPose;
+  const int patience = points ? kPointsPatience : 1;
+  int steps = patience * (start.near ? settings_.warm_iterations : settings_.iterations);
+  float first = start.near ? kNearSigma : kFirstSigma;
   CoherentState state{start.pose, Eigen::Matrix3Xf::Zero(3, solver_.rank()), start.displacements};
-  if (!start.near) state.pose = findPose(sighting, prior, start);
+  if (!start.near) {
+    const int coarse_steps = points ? 0 : steps / 2;  // few points are not told apart
+    const CoherentState coarse = searchCoarsely(sighting, prior, start, coarse_steps);
+    state.pose = coarse.pose;
+    if (coarse_steps > 0) {
+      state.coefficients = coarse.coefficients;
+      solver_.displace(state);
+      steps -= coarse_steps;
+      first = kNarrowSigma;
+    }
+  }
 
   Expectation expectation(source_, sighting, *this);
   solver_.restart(prior);
-  const float first = start.near ? kNearSigma : kFirstSigma;
   const float last = static_cast<float>(settings_.last_sigma) *
                      (sighting.whole && !points ? kWholeSharpness : 1.0F);
-  const int steps = (start.near ? settings_.warm_iterations : settings_.iterations) *
-                    (points ? kPointsPatience : 1);
   for (int step = 0; step < steps; ++step) {
     const float sigma = annealed(first, last, step, steps * 4 / 5);
-    solver_.solve(expectation.at(state, sigma),
-                  trust(sigma, points ? kPointsAcross : kSurfaceAcross), state);
+    solver_.solve(expectation.at(state, sigma), trust(sigma), state,
+                  step + 1 < steps ? kStride : 1.0F);
   }
   // At the same sigma for whole surfaces and views, to be compared
   const double fit = expectation.at(state, static_cast<float>(settings_.last_sigma)).fit;

@@ -61,9 +61,9 @@ class Refinement {
  private:
   class Expectation;
 
-  Eigen::Isometry3f findPose(const Sighting& sighting, const PosePrior& prior,
-                             const SearchStart& start);
-  Trust trust(float sigma, float across) const;
+  CoherentState searchCoarsely(const Sighting& sighting, const PosePrior& prior,
+                               const SearchStart& start, int iterations);
+  Trust trust(float sigma) const;
 
   PointCloud source_;
   std::vector<Eigen::Index> coarse_samples_;
@@ -74,7 +74,7 @@ class Refinement {
   double area_;
   std::shared_ptr<const DisplacementPrior> prior_;
   CoherentSolver solver_;
-  CoherentSolver coarse_solver_;  // for the pose alone
+  CoherentSolver coarse_solver_;
 };
 
 }  // namespace unirit
