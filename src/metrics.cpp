@@ -87,6 +87,8 @@ DisplacementStatistics displacementStatistics(const Points& displacements,
   statistics.p95 = quantile(toVector(lengths), 0.95);
   statistics.max = lengths.maxCoeff();
   std::vector<float> stretches, compressions;
+  stretches.reserve(jacobians.size());
+  compressions.reserve(jacobians.size());
   std::size_t folded = 0;
   for (const Eigen::Matrix3f& jacobian : jacobians) {
     // Principal stretches are the roots of the eigenvalues of J^T J

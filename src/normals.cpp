@@ -83,7 +83,9 @@ class NeighbourGraph {
 class Orientation {
  public:
   Orientation(const NeighbourGraph& graph, Points& normals)
-      : graph_(graph), normals_(normals), best_(static_cast<std::size_t>(normals.cols())) {}
+      : graph_(graph), normals_(normals), best_(static_cast<std::size_t>(normals.cols())) {
+    piece_.reserve(best_.size());
+  }
 
   bool oriented(Eigen::Index i) const { return best_[static_cast<std::size_t>(i)].done; }
 

@@ -23,11 +23,11 @@ constexpr double kClearlyBetterWhole = 0.2;
 constexpr double kClearlyBetterView = 0.5;  // any pose of a part of the organ fits almost as well
 
 PointCloud dropInvalid(const PointCloud& cloud) {
+  if (cloud.points.allFinite()) return cloud;
   std::vector<Eigen::Index> valid;
   for (Eigen::Index i = 0; i < cloud.size(); ++i) {
     if (cloud.points.col(i).allFinite()) valid.push_back(i);
   }
-  if (static_cast<Eigen::Index>(valid.size()) == cloud.size()) return cloud;
   return {select(cloud.points, valid),
           cloud.normals.cols() == 0 ? Points() : select(cloud.normals, valid), cloud.viewpoint};
 }

@@ -150,6 +150,7 @@ std::vector<Eigen::Index> drawByLot(const Points& points, Eigen::Index count) {
   if (count < 1) throw std::invalid_argument("count: at least one point must be asked for");
   std::vector<Eigen::Index> drawn;
   const bool all = points.cols() <= count;
+  drawn.reserve(static_cast<std::size_t>(std::min(points.cols(), 2 * count)));
   const auto limit =
       all ? 0
           : static_cast<std::uint64_t>(

@@ -71,9 +71,9 @@ FieldValues CoherentField::valuesAt(const Eigen::MatrixXf& functions, ThreadTeam
                    product, outputs);
     const Eigen::Map<const Eigen::MatrixXf> rows(product, outputs, count);
     values.displacements.middleCols(first, count) = rows.middleRows<3>(rank);
-    const Eigen::RowVectorXf learnt = rows.topRows(rank).cwiseProduct(known).colwise().sum();
-    values.confidence.segment(first, count) =
-        (learnt.array() / (3.0F * prior_->variance())).max(0.0F).min(1.0F);
+    auto confidence = values.confidence.segment(first, count);
+    confidence = rows.topRows(rank).cwiseProduct(known).colwise().sum();
+    confidence = (confidence.array() / (3.0F * prior_->variance())).max(0.0F).min(1.0F);
   });
   return values;
 }

@@ -61,9 +61,10 @@ CorrespondenceEstimator::CorrespondenceEstimator(const PointCloud& target, const
     const Eigen::Matrix<float, 6, 1> point = oriented(target, order[static_cast<std::size_t>(j)]);
     for (int k = 0; k < 6; ++k) row(k)[j] = point[k];
   }
+  blocks_.reserve(static_cast<std::size_t>(padded_ / kPointBlock));
   for (long first = 0; first < target_count_; first += kPointBlock) {
     const long count = std::min(kPointBlock, target_count_ - first);
-    Points members(3, count);
+    Eigen::Matrix<float, 3, Eigen::Dynamic, 0, 3, kPointBlock> members(3, count);
     for (int axis = 0; axis < 3; ++axis) {
       members.row(axis) = Eigen::Map<const Eigen::RowVectorXf>(row(axis) + first, count);
     }

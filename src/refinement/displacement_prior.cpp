@@ -111,23 +111,21 @@ Points DisplacementPrior::displacements(const Points& points,
 std::vector<Eigen::Matrix3f> DisplacementPrior::gradients(
     const Points& points, const Eigen::Matrix3Xf& coefficients) const {
   const Eigen::Matrix3Xf weights = coefficients * weights_.transpose();
-  Eigen::Matrix<float, 9, Eigen::Dynamic> moments(9, weights.cols());  // weight z^T, by columns
+  Eigen::MatrixXf sums(12, weights.cols());  // of the displacements, and weight z^T by columns
+  sums.topRows<3>() = weights;
   for (int axis = 0; axis < 3; ++axis) {
-    moments.middleRows<3>(3 * axis) = weights.array().rowwise() * inducing_.row(axis).array();
+    sums.middleRows<3>(3 + 3 * axis) = weights.array().rowwise() * inducing_.row(axis).array();
   }
-  std::vector<Eigen::Matrix3f> gradients;
-  gradients.reserve(static_cast<std::size_t>(points.cols()));
-  for (Eigen::Index begin = 0; begin < points.cols(); begin += kBlock) {
-    const Points block = points.middleCols(begin, std::min(kBlock, points.cols() - begin));
-    const Eigen::MatrixXf covariance = covariances(block);
-    const Points displaced = weights * covariance;
-    const Eigen::Matrix<float, 9, Eigen::Dynamic> sums = moments * covariance;
-    for (Eigen::Index i = 0; i < block.cols(); ++i) {
-      gradients.emplace_back(2.0F * exponent_ *
-                             (displaced.col(i) * block.col(i).transpose() -
-                              Eigen::Map<const Eigen::Matrix3f>(sums.col(i).data())));
+  ThreadTeam alone(1);
+  std::vector<Eigen::Matrix3f> gradients(static_cast<std::size_t>(points.cols()));
+  multiply(layerOf(sums), points, alone, [&](Eigen::Index first, const auto& rows) {
+    for (Eigen::Index i = 0; i < rows.cols(); ++i) {
+      const Eigen::Vector3f displacement = rows.col(i).template head<3>();
+      const Eigen::Map<const Eigen::Matrix3f> moments(rows.col(i).data() + 3);
+      gradients[static_cast<std::size_t>(first + i)] =
+          2.0F * exponent_ * (displacement * points.col(first + i).transpose() - moments);
     }
-  }
+  });
   return gradients;
 }
 

@@ -36,6 +36,7 @@ double sampledArea(const Points& points) {
   const Neighbours neighbours(points);
   const Eigen::Index step = std::max<Eigen::Index>(1, points.cols() / kDiscs);
   std::vector<float> squared_radii;
+  squared_radii.reserve(static_cast<std::size_t>(points.cols() / step + 1));
   for (Eigen::Index i = 0; i < points.cols(); i += step) {
     const auto nearest = neighbours.find<kDiscPoints>(points.col(i));
     squared_radii.push_back(nearest.squared_distances[nearest.count - 1]);

@@ -100,6 +100,22 @@ TEST_F(CoherentSolving, StepsSolveTheDenseLeastSquaresProblem) {
   EXPECT_GT(deviations.rotation, 1.2 * kPriorDeviations.rotation);  // 0.3 radian were to be found
 }
 
+TEST_F(CoherentSolving, AStrideGoesSoManyTimesAsFar) {
+  ThreadTeam team(1);
+  CoherentState once = start(), farther = start();
+  const CoherentState before = start();
+  solver(team).solve(seen_, kTrust, once);
+  solver(team).solve(seen_, kTrust, farther, 1.8F);
+  EXPECT_TRUE((farther.coefficients - before.coefficients)
+                  .isApprox(1.8F * (once.coefficients - before.coefficients), 1e-4F));
+  EXPECT_TRUE(farther.displacements.isApprox(farther.coefficients * functions_, 1e-5F));
+  const Eigen::Isometry3f step = before.pose.inverse() * once.pose;
+  const Eigen::Isometry3f stride = before.pose.inverse() * farther.pose;
+  EXPECT_TRUE(stride.translation().isApprox(1.8F * step.translation(), 1e-3F));
+  EXPECT_NEAR(Eigen::AngleAxisf(stride.linear()).angle(),
+              1.8F * Eigen::AngleAxisf(step.linear()).angle(), 1e-3F);
+}
+
 TEST_F(CoherentSolving, CovarianceIsThatOfTheDenseProblem) {
   ThreadTeam team(2);
   CoherentSolver fast = solver(team);

@@ -11,7 +11,7 @@ using test::countAllocations;
 
 /// What a call hands over (the deformation, checks, stage times) and what belongs to its cloud
 /// alone (samples, neighbours, correspondences): a few hundred blocks, however long it iterates.
-constexpr long kOfACall = 700;
+constexpr long kOfACall = 340;
 constexpr double kTreeVaries = 10;  // k-d trees take as many blocks as their points call for
 
 class RegistrationAllocation : public testing::Test {
