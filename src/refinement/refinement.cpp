@@ -164,28 +164,32 @@ CoherentState Refinement::searchCoarsely(const Sighting& sighting, const PosePri
   return state;
 }
 
+Refinement::FineSearch Refinement::prepareFineSearch(const Sighting& sighting,
+                                                     const PosePrior& prior,
+                                                     const SearchStart& start) {
+  const bool points = settings_.correspondence == Correspondence::kPoints;
+  const int patience = points ? kPointsPatience : 1;
+  CoherentState state{start.pose, Eigen::Matrix3Xf::Zero(3, solver_.rank()), start.displacements};
+  if (start.near) return {state, kNearSigma, patience * settings_.warm_iterations};
+
+  const int steps = patience * settings_.iterations;
+  const int coarse_steps = points ? 0 : steps / 2;  // of few, points are not told apart
+  const CoherentState coarse = searchCoarsely(sighting, prior, start, coarse_steps);
+  state.pose = coarse.pose;
+  if (coarse_steps == 0) return {state, kFirstSigma, steps};
+  state.coefficients = coarse.coefficients;
+  solver_.displace(state);
+  return {state, kNarrowSigma, steps - coarse_steps};
+}
+
 Refined Refinement::refine(const PointCloud& target, const SearchStart& start) {
   const Sighting sighting = sightingOf(target, area_);
-  const bool points = settings_.correspondence == Correspondence::kPoints;
   const PosePrior prior = sighting.whole ? kWholePose : kViewPose;
-  const int patience = points ? kPointsPatience : 1;
-  int steps = patience * (start.near ? settings_.warm_iterations : settings_.iterations);
-  float first = start.near ? kNearSigma : kFirstSigma;
-  CoherentState state{start.pose, Eigen::Matrix3Xf::Zero(3, solver_.rank()), start.displacements};
-  if (!start.near) {
-    const int coarse_steps = points ? 0 : steps / 2;  // few points are not told apart
-    const CoherentState coarse = searchCoarsely(sighting, prior, start, coarse_steps);
-    state.pose = coarse.pose;
-    if (coarse_steps > 0) {
-      state.coefficients = coarse.coefficients;
-      solver_.displace(state);
-      steps -= coarse_steps;
-      first = kNarrowSigma;
-    }
-  }
+  auto [state, first, steps] = prepareFineSearch(sighting, prior, start);
 
   Expectation expectation(source_, sighting, *this);
   solver_.restart(prior);
+  const bool points = settings_.correspondence == Correspondence::kPoints;
   const float last = static_cast<float>(settings_.last_sigma) *
                      (sighting.whole && !points ? kWholeSharpness : 1.0F);
   for (int step = 0; step < steps; ++step) {

@@ -61,6 +61,15 @@ class Refinement {
  private:
   class Expectation;
 
+  /// Where the search with all points begins, with what sigma, and how long it takes.
+  struct FineSearch {
+    CoherentState state;
+    float first_sigma;
+    int iterations;
+  };
+
+  FineSearch prepareFineSearch(const Sighting& sighting, const PosePrior& prior,
+                               const SearchStart& start);
   CoherentState searchCoarsely(const Sighting& sighting, const PosePrior& prior,
                                const SearchStart& start, int iterations);
   Trust trust(float sigma) const;
