@@ -130,7 +130,8 @@ void visitSettings(Settings& settings, Visitor&& visitor) {
   auto& r = settings.refinement;
   visitor("refinement/pose_iterations", r.pose_iterations, 0, 100,
           "iterations of the pose alone, with few points");
-  visitor("refinement/iterations", r.iterations, 1, 200, "iterations of pose and displacement, half of them with few points");
+  visitor("refinement/iterations", r.iterations, 1, 200,
+          "iterations of pose and displacement, half of them with few points");
   visitor("refinement/warm_iterations", r.warm_iterations, 1, 200,
           "iterations of both, where they begin at the registration before");
   visitor("refinement/last_sigma", r.last_sigma, 0.002, 0.1,
