@@ -93,8 +93,9 @@ TEST_F(Training, BatchesDependOnSeedAndNumberAlone) {
 }
 
 TEST_F(Training, QueuesPassOnWhatGoesWrong) {
-  const Organ flat{"liver", "2", {{Points::Zero(3, 3), Points()}, Eigen::Matrix3Xi::Zero(3, 1)}};
-  BatchQueue queue({flat}, settings_.batch, 1, 0, 2);
+  const std::vector<Organ> flat{
+      {"liver", "2", {{Points::Zero(3, 3), Points()}, Eigen::Matrix3Xi::Zero(3, 1)}}};
+  BatchQueue queue(flat, settings_.batch, 1, 0, 2);
   EXPECT_THROW(queue.next(), std::invalid_argument);
 }
 
