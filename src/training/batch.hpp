@@ -50,8 +50,8 @@ Batch makeBatch(const std::vector<Organ>& organs, const BatchSettings& settings,
 Batch makeValidation(const std::vector<Organ>& organs, Protocol protocol, std::int64_t per_organ,
                      std::int64_t points, std::uint64_t seed);
 
-/// Makes batches ahead of the trainer, in order, on its own threads. What goes wrong there is
-/// thrown by next().
+/// Makes batches ahead of the trainer, in order, on its own threads; `organs` must outlive it. What
+/// goes wrong there is thrown by next().
 class BatchQueue {
  public:
   BatchQueue(const std::vector<Organ>& organs, const BatchSettings& settings, std::uint64_t seed,
