@@ -176,8 +176,14 @@ SeenOrgan makeSeenOrgan(const Surface& organ, const std::vector<Protocol>& proto
 
 RegistrationPair makePair(const Surface& organ, Protocol protocol, Eigen::Index points,
                           std::uint64_t seed) {
-  const SeenOrgan seen = makeSeenOrgan(organ, {protocol}, points, kSurfaceSamples, seed);
-  return joinPair(seen.points, seen.sights.front());
+  return makePair(organ, viewOf(protocol), points, seed);
+}
+
+RegistrationPair makePair(const Surface& organ, const View& view, Eigen::Index points,
+                          std::uint64_t seed) {
+  Random random(seed);
+  const DeformedOrgan deformed(organ, random.next());
+  return deformed.pair(view, points, random.next(), kSurfaceSamples);
 }
 
 Eigen::Isometry3d bestRigidFit(const Points& from, const Points& to) {

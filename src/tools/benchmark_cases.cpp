@@ -17,8 +17,6 @@
 namespace unirit {
 namespace {
 
-constexpr Eigen::Index kSurfaceSamples = 20000;
-
 /// Turns both clouds together: the problem stays the same, but the network was made for organs as
 /// scanners lay them.
 void turn(RegistrationPair& pair, double degrees, std::uint64_t seed) {
@@ -49,13 +47,6 @@ std::pair<Protocol, View> parseProtocol(const std::string& text) {
   }
   view.visible_share = percent / 100.0;
   return {protocol, view};
-}
-
-/// The pair that makePair makes of a protocol with this view.
-RegistrationPair pairUnder(const View& view, const Surface& organ, int points, std::uint64_t seed) {
-  Random random(seed);
-  const DeformedOrgan deformed(organ, random.next());
-  return deformed.pair(view, points, random.next(), kSurfaceSamples);
 }
 
 std::string labelOf(const BenchmarkOptions& options) {
@@ -111,7 +102,7 @@ std::vector<BenchmarkCase> madeCases(const BenchmarkOptions& options) {
         const std::uint64_t seed = options.seed * 1000003ULL + number++;
         const auto load = [organs, &organ, view = view, seed, points = options.points,
                            angle = options.common_rotation] {
-          RegistrationPair pair = pairUnder(view, organ.surface, points, seed);
+          RegistrationPair pair = makePair(organ.surface, view, points, seed);
           if (angle > 0.0) turn(pair, angle, seed);
           return pair;
         };

@@ -99,6 +99,10 @@ class DeformedOrgan {
 RegistrationPair makePair(const Surface& organ, Protocol protocol, Eigen::Index points,
                           std::uint64_t seed);
 
+/// The same under any view.
+RegistrationPair makePair(const Surface& organ, const View& view, Eigen::Index points,
+                          std::uint64_t seed);
+
 /// A deformed organ under several views, and what they share.
 struct SeenOrgan {
   DeformedPoints points;
