@@ -39,7 +39,7 @@ struct Problem {
     if (pair.viewpoint) target.viewpoint = Points(normalisation.apply(*pair.viewpoint)).col(0);
   }
 
-  Refined refine() { return refinement.refine(target, start); }
+  Refined refine() { return refinement.refine(refinement.sight(target), start); }
 
   /// What makes a further refinement begin where this one ended, as from the view before.
   void beginAt(const Refined& refined) {

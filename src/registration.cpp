@@ -76,8 +76,8 @@ double surprise(const Refined& refined) {
   return refined.coefficients.norm() / std::sqrt(std::max(learnt, 1.0));
 }
 
-void keepBetter(const Refined& other, Refined& refined) {
-  const double margin = refined.whole ? kClearlyBetterWhole : kClearlyBetterView;
+void keepBetter(const Refined& other, bool whole, Refined& refined) {
+  const double margin = whole ? kClearlyBetterWhole : kClearlyBetterView;
   if (other.fit > refined.fit + margin) refined = other;
 }
 
@@ -130,11 +130,11 @@ struct Registrar::Implementation {
                    const Eigen::Isometry3d& guess, const Earlier* earlier);
 
   PointCloud sample(const PointCloud& cloud, const Eigen::Isometry3d& T_organ_cloud) const;
-  Refined refineFrom(const Eigen::Isometry3f& start, const PointCloud& target,
+  Refined refineFrom(const Eigen::Isometry3f& start, const Sighting& sighting,
                      const Points& displacements);
-  Refined refineFromStart(const PointCloud& target, const Eigen::Isometry3d& guess,
+  Refined refineFromStart(const Sighting& sighting, const Eigen::Isometry3d& guess,
                           const Earlier* earlier);
-  RefinementQuality qualityOf(const Refined& refined, const Points& target,
+  RefinementQuality qualityOf(const Refined& refined, const Sighting& sighting,
                               const Deformation& deformation) const;
   Eigen::Isometry3d toMetres(const Eigen::Isometry3f& pose) const;
   Eigen::Isometry3f startOf(const Eigen::Isometry3d& guess, const Earlier& earlier) const;
@@ -169,8 +169,14 @@ Registration Registrar::Implementation::run(const PointCloud& preoperative,
 
   // Refinement from the start
   std::optional<Refined> refined;
+  Sighting sighting;
   const bool refines = contains(settings.stages, Stage::kRefine);
-  if (refines) timed("refine", stages, [&] { refined = refineFromStart(target, guess, earlier); });
+  if (refines) {
+    timed("refine", stages, [&] {
+      sighting = model->refinement->sight(target);
+      refined = refineFromStart(sighting, guess, earlier);
+    });
+  }
   const bool fits = refined && refined->fit > kPoorFit;
 
   // Rigid module
@@ -192,8 +198,9 @@ Registration Registrar::Implementation::run(const PointCloud& preoperative,
 
   // Refinement from where the network left the organ
   if (refined && !fits && settings.stages.front() != Stage::kRefine) {
-    timed("refine", stages,
-          [&] { keepBetter(refineFrom(rigid, target, displacements), *refined); });
+    timed("refine", stages, [&] {
+      keepBetter(refineFrom(rigid, sighting, displacements), sighting.whole, *refined);
+    });
   }
   if (refined) rigid = refined->pose;
 
@@ -210,7 +217,7 @@ Registration Registrar::Implementation::run(const PointCloud& preoperative,
         displacementStatistics(registration.deformation->displacements(),
                                registration.deformation->jacobians(model->samples));
     if (refined && settings.refinement.correspondence == Correspondence::kSurface) {
-      registration.refinement = qualityOf(*refined, target.points, *registration.deformation);
+      registration.refinement = qualityOf(*refined, sighting, *registration.deformation);
     }
     const Eigen::Isometry3d start =
         earlier == nullptr ? guess : earlier->T_intraoperative_preoperative;
@@ -239,41 +246,39 @@ PointCloud Registrar::Implementation::sample(const PointCloud& cloud,
 
 /// The refinement from a pose, and about it; displacements of the samples after it.
 Refined Registrar::Implementation::refineFrom(const Eigen::Isometry3f& start,
-                                              const PointCloud& target,
+                                              const Sighting& sighting,
                                               const Points& displacements) {
   const Eigen::Isometry3f to_start = start.inverse();
-  PointCloud seen{to_start * target.points, {}};
-  if (target.viewpoint) seen.viewpoint = to_start * *target.viewpoint;
-  Refined refined = model->refinement->refine(
-      seen, {Eigen::Isometry3f::Identity(), to_start.linear() * displacements});
+  Refined refined =
+      model->refinement->refine(moved(to_start, sighting),
+                                {Eigen::Isometry3f::Identity(), to_start.linear() * displacements});
   refined.pose = start * refined.pose;
-  if (refined.eye) refined.eye = start * *refined.eye;
   return refined;
 }
 
 /// A short search from what was found earlier, if anything was; a whole one from the guess where
 /// nothing was or it fits poorly.
-Refined Registrar::Implementation::refineFromStart(const PointCloud& target,
+Refined Registrar::Implementation::refineFromStart(const Sighting& sighting,
                                                    const Eigen::Isometry3d& guess,
                                                    const Earlier* earlier) {
   const auto afar = [&] {
     return model->refinement->refine(
-        target, {Eigen::Isometry3f::Identity(), Points::Zero(3, model->sampled.size())});
+        sighting, {Eigen::Isometry3f::Identity(), Points::Zero(3, model->sampled.size())});
   };
   if (earlier == nullptr) return afar();
   const Deformation& found = *earlier->deformation;
   const Points moved = found.move(model->samples) - found.moveRigidly(model->samples);
   const Eigen::Matrix3f to_organ = found.rigidTransform().linear().transpose().cast<float>();
   Refined refined = model->refinement->refine(
-      target, {startOf(guess, *earlier), to_organ * moved / model->normalisation.scale, true});
-  if (refined.fit < kPoorFit) keepBetter(afar(), refined);
+      sighting, {startOf(guess, *earlier), to_organ * moved / model->normalisation.scale, true});
+  if (refined.fit < kPoorFit) keepBetter(afar(), sighting.whole, refined);
   return refined;
 }
 
-/// `target`: in the network's unit and the organ's frame.
-RefinementQuality Registrar::Implementation::qualityOf(const Refined& refined, const Points& target,
+RefinementQuality Registrar::Implementation::qualityOf(const Refined& refined,
+                                                       const Sighting& sighting,
                                                        const Deformation& deformation) const {
-  const Agreement agreement = model->refinement->agreement(target, refined);
+  const Agreement agreement = model->refinement->agreement(sighting, refined);
   return {refined.fit, surprise(refined), agreement.missing,
           deformation.confidence(model->samples).mean(), agreement.residual_left};
 }

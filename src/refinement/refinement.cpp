@@ -182,8 +182,7 @@ Refinement::FineSearch Refinement::prepareFineSearch(const Sighting& sighting,
   return {state, kNarrowSigma, steps - coarse_steps};
 }
 
-Refined Refinement::refine(const PointCloud& target, const SearchStart& start) {
-  const Sighting sighting = sightingOf(target, area_);
+Refined Refinement::refine(const Sighting& sighting, const SearchStart& start) {
   const PosePrior prior = sighting.whole ? kWholePose : kViewPose;
   auto [state, first, steps] = prepareFineSearch(sighting, prior, start);
 
@@ -199,14 +198,14 @@ Refined Refinement::refine(const PointCloud& target, const SearchStart& start) {
   }
   // At the same sigma for whole surfaces and views, to be compared
   const double fit = expectation.at(state, static_cast<float>(settings_.last_sigma)).fit;
-  return {state.pose, state.coefficients, solver_.covarianceFactor(), sighting.whole,
-          fit,        sighting.eye};
+  return {state.pose, state.coefficients, solver_.covarianceFactor(), fit};
 }
 
-Agreement Refinement::agreement(const Points& target, const Refined& refined) const {
+Agreement Refinement::agreement(const Sighting& sighting, const Refined& refined) const {
+  const Points& target = sighting.seen.points;
   const Points bent = source_.points + prior_->displacements(source_.points, refined.coefficients);
   const PointCloud moved{refined.pose * bent, refined.pose.linear() * source_.normals};
-  const Eigen::RowVectorXf visible = visibility(moved, refined.eye);
+  const Eigen::RowVectorXf visible = visibility(moved, sighting.eye);
   const float sparseness = kNearbyPoints / static_cast<float>(target.cols());
   const float reach = kNearby * std::sqrt(std::max(sparseness, 1.0F));
   const Eigen::RowVectorXf lonely =

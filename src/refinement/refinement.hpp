@@ -2,7 +2,6 @@
 #pragma once
 
 #include <memory>
-#include <optional>
 #include <vector>
 
 #include "coherent_solver.hpp"
@@ -16,11 +15,9 @@ namespace unirit {
 /// What the refinement found: p -> pose * (p + prior->displacements(p, coefficients)).
 struct Refined {
   Eigen::Isometry3f pose = Eigen::Isometry3f::Identity();
-  Eigen::Matrix3Xf coefficients;       ///< 3 x rank
-  Eigen::MatrixXf covariance_factor;   ///< CoherentSolver::covarianceFactor
-  bool whole = false;                  ///< the target was taken for the whole surface
-  double fit = 0.0;                    ///< Correspondences::fit at the end
-  std::optional<Eigen::Vector3f> eye;  ///< from where a part is seen, the target's frame
+  Eigen::Matrix3Xf coefficients;      ///< 3 x rank
+  Eigen::MatrixXf covariance_factor;  ///< CoherentSolver::covarianceFactor
+  double fit = 0.0;                   ///< Correspondences::fit at the end
 };
 
 /// Where a search begins. The pose is expected about the identity, wherever it begins.
@@ -48,12 +45,15 @@ class Refinement {
   Refinement(const PointCloud& source, const RefinementSettings& settings, const Kernels& kernels,
              ThreadTeam& team);
 
-  /// `target`: 3 x M samples of what is seen, about where the source lies, normals are estimated;
-  /// its viewpoint in the same frame, if known.
-  Refined refine(const PointCloud& target, const SearchStart& start);
+  /// `target`: 3 x M samples of what is seen, normals are estimated; its viewpoint in the same
+  /// frame, if known.
+  Sighting sight(const PointCloud& target) const { return sightingOf(target, area_); }
 
-  /// `target`: 3 x M, the points that were refined to; `refined` in the same frame.
-  Agreement agreement(const Points& target, const Refined& refined) const;
+  /// What is seen lies about where the source does.
+  Refined refine(const Sighting& sighting, const SearchStart& start);
+
+  /// `refined` to what was seen, in the same frame.
+  Agreement agreement(const Sighting& sighting, const Refined& refined) const;
 
   const std::shared_ptr<const DisplacementPrior>& prior() const { return prior_; }
   const PointCloud& source() const { return source_; }

@@ -63,6 +63,14 @@ Sighting sightingOf(const PointCloud& target, double organ_area) {
   return sighting;
 }
 
+Sighting moved(const Eigen::Isometry3f& transform, const Sighting& sighting) {
+  Sighting moved{{transform * sighting.seen.points, transform.linear() * sighting.seen.normals},
+                 sighting.whole,
+                 sighting.eye};
+  if (moved.eye) moved.eye = transform * *moved.eye;
+  return moved;
+}
+
 Eigen::RowVectorXf visibility(const PointCloud& oriented,
                               const std::optional<Eigen::Vector3f>& eye) {
   Eigen::RowVectorXf visibility;

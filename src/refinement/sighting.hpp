@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <Eigen/Geometry>
 #include <optional>
 
 #include "unirit/point_cloud.hpp"
@@ -13,6 +14,9 @@ struct Sighting {
   bool whole = false;                  ///< all of the surface, else a part of it from one side
   std::optional<Eigen::Vector3f> eye;  ///< from where a part is seen
 };
+
+/// The same seen in another frame.
+Sighting moved(const Eigen::Isometry3f& transform, const Sighting& sighting);
 
 /// Area of the surface that the points sample evenly, in the points' unit squared: what the discs
 /// cover that reach to their 14th nearest points. No outlier that is a minority moves it.

@@ -56,8 +56,9 @@ struct Outcome {
   }
 
   void refine(const Problem& problem) {
+    sighting = refinement.sight(problem.target);
     refined = refinement.refine(
-        problem.target, {Eigen::Isometry3f::Identity(), Points::Zero(3, problem.source.size())});
+        sighting, {Eigen::Isometry3f::Identity(), Points::Zero(3, problem.source.size())});
     const Points& points = problem.source.points;
     moved =
         refined.pose * (points + refinement.prior()->displacements(points, refined.coefficients));
@@ -69,6 +70,7 @@ struct Outcome {
 
   ThreadTeam team;
   Refinement refinement;
+  Sighting sighting;
   Refined refined;
   Points moved;  // the network's unit
 };
@@ -131,8 +133,8 @@ TEST(Refinement, FindsEachPointAmongTheSamePoints) {
 
 TEST(Refinement, TellsWholeSurfacesFromViewsOfOneSide) {
   for (const char* organ : kOrgans) {
-    EXPECT_TRUE(Outcome(Problem(pairOf(organ, Protocol::kResampled, 1))).refined.whole) << organ;
-    EXPECT_FALSE(Outcome(Problem(pairOf(organ, Protocol::kPartial, 1))).refined.whole) << organ;
+    EXPECT_TRUE(Outcome(Problem(pairOf(organ, Protocol::kResampled, 1))).sighting.whole) << organ;
+    EXPECT_FALSE(Outcome(Problem(pairOf(organ, Protocol::kPartial, 1))).sighting.whole) << organ;
   }
 }
 
