@@ -168,6 +168,10 @@ std::vector<PlausibilityCheck> checkOutput(const Registration& registration,
       atLeast("mean confidence", quality.confidence, settings.min_confidence),
       atMost("surprise of the displacement", quality.surprise, settings.max_surprise)};
   checks.insert(checks.end(), more.begin(), more.end());
+  if (quality.flip_gain) {
+    checks.push_back(
+        atMost("gain in fit of the organ flipped", *quality.flip_gain, settings.max_flip_gain));
+  }
   checks.push_back(jointly({turn, tail, bend, more[1], more[2], more[3]}, settings.max_joint));
   return checks;
 }

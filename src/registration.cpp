@@ -135,7 +135,7 @@ struct Registrar::Implementation {
   Refined refineFromStart(const Sighting& sighting, const Eigen::Isometry3d& guess,
                           const Earlier* earlier);
   RefinementQuality qualityOf(const Refined& refined, const Sighting& sighting,
-                              const Deformation& deformation) const;
+                              const Deformation& deformation, bool cold) const;
   Eigen::Isometry3d toMetres(const Eigen::Isometry3f& pose) const;
   Eigen::Isometry3f startOf(const Eigen::Isometry3d& guess, const Earlier& earlier) const;
   std::shared_ptr<const Deformation> deformationOf(const PointCloud& preoperative,
@@ -217,7 +217,8 @@ Registration Registrar::Implementation::run(const PointCloud& preoperative,
         displacementStatistics(registration.deformation->displacements(),
                                registration.deformation->jacobians(model->samples));
     if (refined && settings.refinement.correspondence == Correspondence::kSurface) {
-      registration.refinement = qualityOf(*refined, sighting, *registration.deformation);
+      registration.refinement =
+          qualityOf(*refined, sighting, *registration.deformation, earlier == nullptr);
     }
     const Eigen::Isometry3d start =
         earlier == nullptr ? guess : earlier->T_intraoperative_preoperative;
@@ -277,10 +278,13 @@ Refined Registrar::Implementation::refineFromStart(const Sighting& sighting,
 
 RefinementQuality Registrar::Implementation::qualityOf(const Refined& refined,
                                                        const Sighting& sighting,
-                                                       const Deformation& deformation) const {
+                                                       const Deformation& deformation,
+                                                       bool cold) const {
   const Agreement agreement = model->refinement->agreement(sighting, refined);
-  return {refined.fit, surprise(refined), agreement.missing,
-          deformation.confidence(model->samples).mean(), agreement.residual_left};
+  RefinementQuality quality{refined.fit, surprise(refined), agreement.missing,
+                            deformation.confidence(model->samples).mean(), agreement.residual_left};
+  if (cold) quality.flip_gain = model->refinement->flipGain(sighting, refined.pose);
+  return quality;
 }
 
 Eigen::Isometry3d Registrar::Implementation::toMetres(const Eigen::Isometry3f& pose) const {

@@ -31,6 +31,9 @@ struct RefinementQuality {
   double confidence = 0.0;     ///< DisplacementField::confidence, mean over the organ
   double residual_left = 1.0;  ///< RMS distance of the cloud to the moved organ over that to the
                                ///< rigidly moved one: below 1 the displacement gained something
+  /// What the fit of the undisplaced organ gains where it is flipped, half a turn about a principal
+  /// axis: above 0 it may lie upside down. Not where the search began at an earlier registration.
+  std::optional<double> flip_gain = std::nullopt;
 };
 
 /// What a registration found, and how far it can be believed.

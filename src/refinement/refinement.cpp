@@ -4,6 +4,7 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "unirit/metrics.hpp"
 #include "unirit/sampling.hpp"
@@ -25,6 +26,8 @@ constexpr float kWidestSigma = 0.4F;         // where the pose alone is sought
 constexpr float kFirstSigma = 0.12F;         // where pose and displacement are sought
 constexpr float kNarrowSigma = 0.06F;        // where either ends that has few points
 constexpr float kNearSigma = 0.04F;          // where the search begins near its end
+constexpr float kFlipSigma = 0.2F;           // where a flipped organ begins
+constexpr int kFlipIterations = 8;
 constexpr float kStride = 1.8F;           // of all iterations of both but the last: over-relaxation
 constexpr float kWholeSharpness = 0.75F;  // last sigma of a whole surface over that of a view
 constexpr float kSurfaceAcross = 0.3F;    // deviation along the surface, which geometry hardly sees
@@ -45,11 +48,34 @@ PointCloud pick(const PointCloud& cloud, const std::vector<Eigen::Index>& sample
   return {select(cloud.points, samples), select(cloud.normals, samples)};
 }
 
+Sighting pickFew(const Sighting& sighting) {
+  return {pick(sighting.seen, sampleEvenly(sighting.seen.points, kCoarsePoints)), sighting.whole,
+          sighting.eye};
+}
+
+PosePrior priorOf(const Sighting& sighting) { return sighting.whole ? kWholePose : kViewPose; }
+
+/// In columns.
+Eigen::Matrix3f principalAxes(const Points& points) {
+  const Points centred = points.colwise() - centroid(points);
+  return Eigen::SelfAdjointEigenSolver<Eigen::Matrix3f>(centred * centred.transpose())
+      .eigenvectors();
+}
+
+/// Half turns about the principal axes.
+std::array<Eigen::Isometry3f, 3> flipsOf(const Points& points) {
+  const Eigen::Matrix3f axes = principalAxes(points);
+  const Eigen::Translation3f centre(centroid(points));
+  const auto flip = [&](int axis) -> Eigen::Isometry3f {
+    const Eigen::AngleAxisf half_turn(static_cast<float>(M_PI), axes.col(axis));
+    return centre * half_turn * centre.inverse();
+  };
+  return {flip(0), flip(1), flip(2)};
+}
+
 /// Geometric mean of the sides of a box along the principal axes.
 double boxSide(const Points& points) {
-  const Points centred = points.colwise() - centroid(points);
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3f> axes(centred * centred.transpose());
-  const Points along = axes.eigenvectors().transpose() * centred;
+  const Points along = principalAxes(points).transpose() * points;
   const Eigen::Vector3f sides = along.rowwise().maxCoeff() - along.rowwise().minCoeff();
   return std::cbrt(static_cast<double>(sides.prod()));
 }
@@ -130,6 +156,7 @@ Refinement::Refinement(const PointCloud& source, const RefinementSettings& setti
       kernels_(kernels),
       team_(team),
       area_(sampledArea(source.points)),
+      flips_(flipsOf(source.points)),
       prior_(std::make_shared<const DisplacementPrior>(
           source.points, kPriorLength * boxSide(source.points), kPriorAmplitude, kRank)),
       solver_(source.points, prior_->functions(source.points), kViewPose, kernels, team),
@@ -141,20 +168,24 @@ Trust Refinement::trust(float sigma) const {
   return {sigma, std::hypot(across, sigma), points ? 1.0F : kSurfaceWeight};
 }
 
+/// With few points, without a change of the displacement.
+void Refinement::seekPose(Expectation& expectation, float first_sigma, int iterations,
+                          CoherentState& state) {
+  for (int step = 0; step < iterations; ++step) {
+    const float sigma = annealed(first_sigma, kNarrowSigma, step, iterations);
+    coarse_solver_.solvePose(expectation.at(state, sigma), {sigma, sigma, kSurfaceWeight}, state);
+  }
+}
+
 /// With few points, from wide to narrow: the pose alone, then `iterations` of both.
 CoherentState Refinement::searchCoarsely(const Sighting& sighting, const PosePrior& prior,
                                          const SearchStart& start, int iterations) {
-  const Sighting coarse{pick(sighting.seen, sampleEvenly(sighting.seen.points, kCoarsePoints)),
-                        sighting.whole, sighting.eye};
+  const Sighting coarse = pickFew(sighting);
   Expectation expectation(coarse_, coarse, *this);
   coarse_solver_.restart(prior);
   CoherentState state{start.pose, Eigen::Matrix3Xf::Zero(3, solver_.rank()),
                       select(start.displacements, coarse_samples_)};
-  const int steps = settings_.pose_iterations;
-  for (int step = 0; step < steps; ++step) {
-    const float sigma = annealed(kWidestSigma, kNarrowSigma, step, steps);
-    coarse_solver_.solvePose(expectation.at(state, sigma), {sigma, sigma, kSurfaceWeight}, state);
-  }
+  seekPose(expectation, kWidestSigma, settings_.pose_iterations, state);
   for (int step = 0; step < iterations; ++step) {
     const float sigma = annealed(kFirstSigma, kNarrowSigma, step, iterations);
     Trust each = trust(sigma);
@@ -183,7 +214,7 @@ Refinement::FineSearch Refinement::prepareFineSearch(const Sighting& sighting,
 }
 
 Refined Refinement::refine(const Sighting& sighting, const SearchStart& start) {
-  const PosePrior prior = sighting.whole ? kWholePose : kViewPose;
+  const PosePrior prior = priorOf(sighting);
   auto [state, first, steps] = prepareFineSearch(sighting, prior, start);
 
   Expectation expectation(source_, sighting, *this);
@@ -199,6 +230,22 @@ Refined Refinement::refine(const Sighting& sighting, const SearchStart& start) {
   // At the same sigma for whole surfaces and views, to be compared
   const double fit = expectation.at(state, static_cast<float>(settings_.last_sigma)).fit;
   return {state.pose, state.coefficients, solver_.covarianceFactor(), fit};
+}
+
+double Refinement::flipGain(const Sighting& sighting, const Eigen::Isometry3f& pose) {
+  const Sighting few = pickFew(sighting);
+  const auto fitAbout = [&](const Eigen::Isometry3f& start) {
+    const Sighting seen = moved(start.inverse(), few);
+    Expectation expectation(coarse_, seen, *this);
+    coarse_solver_.restart(priorOf(seen));
+    CoherentState state;
+    state.displacements.setZero(3, coarse_.size());
+    seekPose(expectation, kFlipSigma, kFlipIterations, state);
+    return expectation.at(state, kNarrowSigma).fit;
+  };
+  double best = -std::numeric_limits<double>::infinity();
+  for (const Eigen::Isometry3f& flip : flips_) best = std::max(best, fitAbout(pose * flip));
+  return best - fitAbout(pose);
 }
 
 Agreement Refinement::agreement(const Sighting& sighting, const Refined& refined) const {

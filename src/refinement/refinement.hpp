@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <array>
 #include <memory>
 #include <vector>
 
@@ -52,6 +53,10 @@ class Refinement {
   /// What is seen lies about where the source does.
   Refined refine(const Sighting& sighting, const SearchStart& start);
 
+  /// What the fit gains where the organ is flipped, half a turn about a principal axis: the best of
+  /// three such starts over `pose`, each moved to where the organ fits best without a displacement.
+  double flipGain(const Sighting& sighting, const Eigen::Isometry3f& pose);
+
   /// `refined` to what was seen, in the same frame.
   Agreement agreement(const Sighting& sighting, const Refined& refined) const;
 
@@ -72,6 +77,7 @@ class Refinement {
                                const SearchStart& start);
   CoherentState searchCoarsely(const Sighting& sighting, const PosePrior& prior,
                                const SearchStart& start, int iterations);
+  void seekPose(Expectation& expectation, float first_sigma, int iterations, CoherentState& state);
   Trust trust(float sigma) const;
 
   PointCloud source_;
@@ -81,6 +87,7 @@ class Refinement {
   const Kernels& kernels_;
   ThreadTeam& team_;
   double area_;
+  std::array<Eigen::Isometry3f, 3> flips_;  // half turns about the organ's principal axes
   std::shared_ptr<const DisplacementPrior> prior_;
   CoherentSolver solver_;
   CoherentSolver coarse_solver_;

@@ -217,6 +217,7 @@ PlausibilitySettings fromConfig(const UniritConfig& config) {
   settings.max_missing = config.max_missing;
   settings.min_confidence = config.min_confidence;
   settings.max_surprise = config.max_surprise;
+  settings.max_flip_gain = config.max_flip_gain;
   settings.max_displacement = config.max_displacement;
   settings.max_stretch = config.max_stretch;
   settings.min_compression = config.min_compression;

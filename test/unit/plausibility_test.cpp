@@ -70,7 +70,9 @@ Registration plausiblyRefined() {
 std::string refusalOf(Registration registration) {
   applyChecks(checkOutput(registration, Eigen::Isometry3d::Identity(), 0.2, kDefaults),
               registration);
-  EXPECT_EQ(registration.checks.size(), registration.refinement ? 15U : 10U);
+  std::size_t checks = 10;
+  if (registration.refinement) checks += registration.refinement->flip_gain ? 6 : 5;
+  EXPECT_EQ(registration.checks.size(), checks);
   return registration.succeeded() ? "" : registration.message;
 }
 
@@ -229,6 +231,12 @@ TEST(CheckOutput, RefusesWhatTheRefinementShouldNotHaveFound) {
   registration.refinement->surprise = 2.5;
   EXPECT_EQ(refusalOf(registration),
             above("surprise of the displacement", 2.5, kDefaults.max_surprise));
+  registration = plausiblyRefined();
+  registration.refinement->flip_gain = -0.5;
+  EXPECT_EQ(refusalOf(registration), "");
+  registration.refinement->flip_gain = 0.75;
+  EXPECT_EQ(refusalOf(registration),
+            above("gain in fit of the organ flipped", 0.75, kDefaults.max_flip_gain));
 }
 
 TEST(CheckOutput, RefusesWhatIsCloseToAllLimitsAtOnce) {

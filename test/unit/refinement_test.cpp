@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 
 #include "refinement/coherent_field.hpp"
@@ -135,6 +136,27 @@ TEST(Refinement, TellsWholeSurfacesFromViewsOfOneSide) {
   for (const char* organ : kOrgans) {
     EXPECT_TRUE(Outcome(Problem(pairOf(organ, Protocol::kResampled, 1))).sighting.whole) << organ;
     EXPECT_FALSE(Outcome(Problem(pairOf(organ, Protocol::kPartial, 1))).sighting.whole) << organ;
+  }
+}
+
+TEST(Refinement, FitsBetterFlippedWhereItLiesUpsideDown) {
+  for (const char* organ : kOrgans) {
+    for (const Protocol protocol : {Protocol::kResampled, Protocol::kPartial}) {
+      Problem problem(pairOf(organ, protocol, 1));
+      Outcome found(problem);
+      const auto gain = [&](const Eigen::Isometry3f& pose) {
+        return found.refinement.flipGain(found.sighting, pose);
+      };
+      EXPECT_LT(gain(found.refined.pose), 0.0) << organ << ' ' << toString(protocol);
+      const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3f> axes(problem.source.points *
+                                                                problem.source.points.transpose());
+      for (int axis = 0; axis < 3; ++axis) {
+        const Eigen::Isometry3f flip(
+            Eigen::AngleAxisf(static_cast<float>(M_PI), axes.eigenvectors().col(axis)));
+        EXPECT_GT(gain(found.refined.pose * flip), 0.0)
+            << organ << ' ' << toString(protocol) << " about axis " << axis;
+      }
+    }
   }
 }
 

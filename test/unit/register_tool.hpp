@@ -54,8 +54,8 @@ class RegisterTool : public ::testing::Test {
     write("settings.yaml",
           "sampling: {points: 256}\nplausibility: {max_residual: 1, max_residual_p95: 1, "
           "min_inliers: 0, max_residual_left: 10, max_missing: 1, min_confidence: 0, "
-          "max_surprise: 10, max_displacement: 2, max_stretch: 100, min_compression: 0, "
-          "max_folded: 1, max_turn: 180, max_joint: 10, min_overlap: 0}\n");
+          "max_surprise: 10, max_flip_gain: 10, max_displacement: 2, max_stretch: 100, "
+          "min_compression: 0, max_folded: 1, max_turn: 180, max_joint: 10, min_overlap: 0}\n");
     write("strict.yaml", "plausibility: {max_residual: 0}\n");
     write("wrong.yaml", "sampling: {point: 256}\n");
     write("broken.safetensors", "not weights");
