@@ -183,9 +183,9 @@ void CoherentSolver::displace(CoherentState& state) const {
   state.displacements.noalias() = state.coefficients * functions_;
 }
 
-Eigen::MatrixXf CoherentSolver::covarianceFactor() const {
-  const Eigen::Index size = matrix_.rows(), coefficients = 3 * rank();
-  return factor_.matrixL().solve(Eigen::MatrixXf::Identity(size, coefficients));
+void CoherentSolver::covarianceFactor(Eigen::MatrixXf& factor) const {
+  factor.setIdentity(matrix_.rows(), 3 * rank());
+  factor_.matrixL().solveInPlace(factor);
 }
 
 }  // namespace unirit

@@ -55,7 +55,7 @@ class CoherentSolver {
 
   /// After solve: F such that the coefficients of axis a have the covariance F_a^T F_a, where F_a
   /// are the columns from a * rank on; (3 rank + 6) x 3 rank.
-  Eigen::MatrixXf covarianceFactor() const;
+  void covarianceFactor(Eigen::MatrixXf& factor) const;
 
  private:
   using RowMajor = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;

@@ -45,23 +45,27 @@ Eigen::Matrix<float, 6, 1> oriented(const PointCloud& cloud, Eigen::Index i) {
 
 }  // namespace
 
-CorrespondenceEstimator::CorrespondenceEstimator(const PointCloud& target, const Kernels& kernels,
-                                                 ThreadTeam& team)
-    : kernels_(kernels),
-      team_(team),
-      target_count_(target.size()),
-      padded_((target.size() + kPointBlock - 1) / kPointBlock * kPointBlock),
-      targets_(static_cast<std::size_t>(6 * padded_)),
-      target_weights_(static_cast<std::size_t>(padded_)) {
-  std::vector<int> order(static_cast<std::size_t>(target_count_));
-  std::iota(order.begin(), order.end(), 0);
-  sortIntoBlocks(target.points, order.data(), order.data() + order.size());
+void CorrespondenceEstimator::reserve(long target_count) {
+  target_count_ = target_count;
+  padded_ = (target_count + kPointBlock - 1) / kPointBlock * kPointBlock;
+  if (padded_ <= capacity_) return;
+  targets_ = AlignedFloats(static_cast<std::size_t>(6 * padded_));
+  target_weights_ = AlignedFloats(static_cast<std::size_t>(padded_));
+  capacity_ = padded_;
+}
+
+void CorrespondenceEstimator::aimAt(const PointCloud& target) {
+  reserve(target.size());
+  order_.resize(static_cast<std::size_t>(target_count_));
+  std::iota(order_.begin(), order_.end(), 0);
+  sortIntoBlocks(target.points, order_.data(), order_.data() + order_.size());
   std::fill_n(targets_.data(), 3 * padded_, kFarAway);
+  std::fill_n(targets_.data() + 3 * padded_, 3 * padded_, 0.0F);
   for (long j = 0; j < target_count_; ++j) {
-    const Eigen::Matrix<float, 6, 1> point = oriented(target, order[static_cast<std::size_t>(j)]);
+    const Eigen::Matrix<float, 6, 1> point = oriented(target, order_[static_cast<std::size_t>(j)]);
     for (int k = 0; k < 6; ++k) row(k)[j] = point[k];
   }
-  blocks_.reserve(static_cast<std::size_t>(padded_ / kPointBlock));
+  blocks_.clear();
   for (long first = 0; first < target_count_; first += kPointBlock) {
     const long count = std::min(kPointBlock, target_count_ - first);
     Eigen::Matrix<float, 3, Eigen::Dynamic, 0, 3, kPointBlock> members(3, count);
@@ -71,8 +75,12 @@ CorrespondenceEstimator::CorrespondenceEstimator(const PointCloud& target, const
     const Eigen::Vector3f centre = members.rowwise().mean();
     blocks_.push_back({centre, (members.colwise() - centre).colwise().norm().maxCoeff()});
   }
-  const Points centred = target.points.colwise() - centroid(target.points);
-  Eigen::Matrix3f covariance = centred * centred.transpose() / static_cast<float>(target_count_);
+  const Eigen::Vector3f middle = centroid(target.points);
+  Eigen::Matrix3f covariance = Eigen::Matrix3f::Zero();
+  for (const auto& point : target.points.colwise()) {
+    covariance += (point - middle) * (point - middle).transpose();
+  }
+  covariance /= static_cast<float>(target_count_);
   covariance.diagonal().array() += kFlatVariance;
   volume_ = std::sqrt(kBoxVariance * kBoxVariance * kBoxVariance * covariance.determinant());
 }
@@ -105,9 +113,9 @@ int* CorrespondenceEstimator::nearbyOf(Eigen::Index source) {
 void CorrespondenceEstimator::sumAffinities(const PointCloud& source, float reach,
                                             const AffinityView& affinity) {
   const long chunks = (source.size() + kChunk - 1) / kChunk;
-  if (chunks > chunk_capacity_) {
-    chunk_sums_ = AlignedFloats(static_cast<std::size_t>(chunks * padded_));
-    chunk_capacity_ = chunks;
+  if (chunks * padded_ > chunk_capacity_) {
+    chunk_capacity_ = chunks * padded_;
+    chunk_sums_ = AlignedFloats(static_cast<std::size_t>(chunk_capacity_));
   }
   source_sums_.resize(static_cast<std::size_t>(source.size()));
   nearby_counts_.resize(static_cast<std::size_t>(source.size()));

@@ -30,12 +30,16 @@ struct Correspondences {
 
 /// Soft correspondences of a moving source with a target that stays: the expectation step of
 /// coherent point drift (Myronenko & Song 2010, eq. 7), with normals. Target points far from a
-/// source point, in units of sigma, are passed over block by block. Allocates only where the
-/// source grows.
+/// source point, in units of sigma, are passed over block by block. Allocates only where source or
+/// target grow.
 class CorrespondenceEstimator {
  public:
-  /// `target` with normals. `kernels` and `team` must outlive it.
-  CorrespondenceEstimator(const PointCloud& target, const Kernels& kernels, ThreadTeam& team);
+  /// `kernels` and `team` must outlive it.
+  CorrespondenceEstimator(const Kernels& kernels, ThreadTeam& team)
+      : kernels_(kernels), team_(team) {}
+
+  /// The target from now on, with normals.
+  void aimAt(const PointCloud& target);
 
   /// `source` with normals; `visibility` in [0, 1]: how sure it is that each source point is seen.
   void estimate(const PointCloud& source, const Eigen::RowVectorXf& visibility,
@@ -47,6 +51,7 @@ class CorrespondenceEstimator {
     float radius;
   };
 
+  void reserve(long target_count);
   long findNearby(const Eigen::Vector3f& point, float reach, int* nearby) const;
   int* nearbyOf(Eigen::Index source);
   double fit(const Eigen::RowVectorXf& visibility, float target_background,
@@ -57,15 +62,17 @@ class CorrespondenceEstimator {
 
   const Kernels& kernels_;
   ThreadTeam& team_;
-  long target_count_;
-  long padded_;            // to whole blocks
-  AlignedFloats targets_;  // six rows: x, y, z, normal x, y, z
-  float volume_;           // of a box with the target's principal variances
+  long target_count_ = 0;
+  long padded_ = 0;  // to whole blocks
+  long capacity_ = 0;
+  AlignedFloats targets_;   // six rows: x, y, z, normal x, y, z
+  std::vector<int> order_;  // the target's points, sorted into blocks
+  float volume_ = 0.0F;     // of a box with the target's principal variances
   std::vector<Block> blocks_;
   std::vector<int> nearby_;  // blocks near each source point, one row a point
   std::vector<long> nearby_counts_;
   AlignedFloats chunk_sums_;  // one row a chunk of source points
-  long chunk_capacity_ = 0;
+  long chunk_capacity_ = 0;   // numbers in them
   AlignedFloats target_weights_;
   std::vector<float> source_sums_;
 };

@@ -34,7 +34,6 @@ constexpr float kSurfaceAcross = 0.3F;    // deviation along the surface, which 
 constexpr float kPointsAcross = 0.01F;
 constexpr int kPointsPatience = 2;  // times the iterations: points are told apart late
 constexpr float kSurfaceWeight = 0.4F;
-constexpr float kWholeSymmetry = 1.0F;    // a view needs more, lest it draw the organ together
 constexpr float kNearby = 0.1F;           // a point without a neighbour within it is not seen,
 constexpr float kNearbyPoints = 1024.0F;  // of so many; fewer lie farther apart
 
@@ -80,17 +79,6 @@ double boxSide(const Points& points) {
   return std::cbrt(static_cast<double>(sides.prod()));
 }
 
-Attraction attractionOf(Correspondence correspondence, bool whole) {
-  Attraction attraction;
-  attraction.normals = whole ? NormalUse::kUnsigned : NormalUse::kSigned;
-  if (whole) attraction.symmetry = kWholeSymmetry;
-  if (correspondence == Correspondence::kPoints) {
-    attraction.normals = NormalUse::kNone;
-    attraction.symmetry = 0.0F;
-  }
-  return attraction;
-}
-
 }  // namespace
 
 Eigen::Isometry3f beyondExpectation(const Eigen::Isometry3f& pose) {
@@ -102,50 +90,6 @@ Eigen::Isometry3f beyondExpectation(const Eigen::Isometry3f& pose) {
   return Eigen::Translation3f(share * pose.translation()) *
          Eigen::Quaternionf::Identity().slerp(share, rotation);
 }
-
-/// The expectation step of one search, with a sampling of the organ.
-class Refinement::Expectation {
- public:
-  Expectation(const PointCloud& source, const Sighting& sighting, const Refinement& refinement)
-      : source_(source),
-        sighting_(sighting),
-        attraction_(attractionOf(refinement.settings_.correspondence, sighting.whole)),
-        estimator_(sighting.seen, refinement.kernels_, refinement.team_) {}
-
-  const Correspondences& at(const CoherentState& state, float sigma) {
-    attraction_.sigma = sigma;
-    bent_ = source_.points + state.displacements;
-    moved_.points = state.pose.translation().replicate(1, source_.size());
-    moved_.points.noalias() += state.pose.linear() * bent_;
-    moved_.normals.noalias() = state.pose.linear() * source_.normals;
-    updateVisibility(moved_, sighting_.eye, visibility_);
-    estimator_.estimate(moved_, visibility_, attraction_, correspondences_);
-    turnNormals();
-    return correspondences_;
-  }
-
- private:
-  /// Halfway to the organ's own normals, as in the symmetric objective of Rusinkiewicz (2019):
-  /// those of the cloud are estimated from a few noisy points.
-  void turnNormals() {
-    for (Eigen::Index i = 0; i < source_.size(); ++i) {
-      auto normal = correspondences_.normals.col(i);
-      const auto own = moved_.normals.col(i);
-      if (normal.isZero()) continue;  // nothing is near
-      normal += std::copysign(1.0F, normal.dot(own)) * own;
-      normal.normalize();
-    }
-  }
-
-  const PointCloud& source_;
-  const Sighting& sighting_;
-  Attraction attraction_;
-  CorrespondenceEstimator estimator_;
-  Points bent_;
-  PointCloud moved_;
-  Eigen::RowVectorXf visibility_;
-  Correspondences correspondences_;
-};
 
 Refinement::Refinement(const PointCloud& source, const RefinementSettings& settings,
                        const Kernels& kernels, ThreadTeam& team)
@@ -159,6 +103,8 @@ Refinement::Refinement(const PointCloud& source, const RefinementSettings& setti
       flips_(flipsOf(source.points)),
       prior_(std::make_shared<const DisplacementPrior>(
           source.points, kPriorLength * boxSide(source.points), kPriorAmplitude, kRank)),
+      expectation_(source_, settings.correspondence, kernels, team),
+      coarse_expectation_(coarse_, settings.correspondence, kernels, team),
       solver_(source.points, prior_->functions(source.points), kViewPose, kernels, team),
       coarse_solver_(coarse_.points, prior_->functions(coarse_.points), kViewPose, kernels, team) {}
 
@@ -169,79 +115,89 @@ Trust Refinement::trust(float sigma) const {
 }
 
 /// With few points, without a change of the displacement.
-void Refinement::seekPose(Expectation& expectation, float first_sigma, int iterations,
-                          CoherentState& state) {
+void Refinement::seekPose(float first_sigma, int iterations) {
   for (int step = 0; step < iterations; ++step) {
     const float sigma = annealed(first_sigma, kNarrowSigma, step, iterations);
-    coarse_solver_.solvePose(expectation.at(state, sigma), {sigma, sigma, kSurfaceWeight}, state);
+    coarse_solver_.solvePose(coarse_expectation_.at(coarse_state_, sigma),
+                             {sigma, sigma, kSurfaceWeight}, coarse_state_);
   }
 }
 
 /// With few points, from wide to narrow: the pose alone, then `iterations` of both.
-CoherentState Refinement::searchCoarsely(const Sighting& sighting, const PosePrior& prior,
-                                         const SearchStart& start, int iterations) {
-  const Sighting coarse = pickFew(sighting);
-  Expectation expectation(coarse_, coarse, *this);
+void Refinement::searchCoarsely(const Sighting& sighting, const PosePrior& prior,
+                                const SearchStart& start, int iterations) {
+  coarse_expectation_.look(pickFew(sighting));
   coarse_solver_.restart(prior);
-  CoherentState state{start.pose, Eigen::Matrix3Xf::Zero(3, solver_.rank()),
-                      select(start.displacements, coarse_samples_)};
-  seekPose(expectation, kWidestSigma, settings_.pose_iterations, state);
+  coarse_state_.pose = start.pose;
+  coarse_state_.coefficients.setZero(3, coarse_solver_.rank());
+  coarse_state_.displacements = select(start.displacements, coarse_samples_);
+  seekPose(kWidestSigma, settings_.pose_iterations);
   for (int step = 0; step < iterations; ++step) {
     const float sigma = annealed(kFirstSigma, kNarrowSigma, step, iterations);
     Trust each = trust(sigma);
     each.weight *= static_cast<float>(source_.size()) / static_cast<float>(coarse_.size());
-    coarse_solver_.solve(expectation.at(state, sigma), each, state, kStride);
+    coarse_solver_.solve(coarse_expectation_.at(coarse_state_, sigma), each, coarse_state_,
+                         kStride);
   }
-  return state;
 }
 
+/// Leaves the state where the search with all points begins.
 Refinement::FineSearch Refinement::prepareFineSearch(const Sighting& sighting,
                                                      const PosePrior& prior,
                                                      const SearchStart& start) {
   const bool points = settings_.correspondence == Correspondence::kPoints;
   const int patience = points ? kPointsPatience : 1;
-  CoherentState state{start.pose, Eigen::Matrix3Xf::Zero(3, solver_.rank()), start.displacements};
-  if (start.near) return {state, kNearSigma, patience * settings_.warm_iterations};
+  state_.pose = start.pose;
+  state_.coefficients.setZero(3, solver_.rank());
+  state_.displacements = start.displacements;
+  if (start.near) return {kNearSigma, patience * settings_.warm_iterations};
 
   const int steps = patience * settings_.iterations;
   const int coarse_steps = points ? 0 : steps / 2;  // of few, points are not told apart
-  const CoherentState coarse = searchCoarsely(sighting, prior, start, coarse_steps);
-  state.pose = coarse.pose;
-  if (coarse_steps == 0) return {state, kFirstSigma, steps};
-  state.coefficients = coarse.coefficients;
-  solver_.displace(state);
-  return {state, kNarrowSigma, steps - coarse_steps};
+  searchCoarsely(sighting, prior, start, coarse_steps);
+  state_.pose = coarse_state_.pose;
+  if (coarse_steps == 0) return {kFirstSigma, steps};
+  state_.coefficients = coarse_state_.coefficients;
+  solver_.displace(state_);
+  return {kNarrowSigma, steps - coarse_steps};
 }
 
 Refined Refinement::refine(const Sighting& sighting, const SearchStart& start) {
-  const PosePrior prior = priorOf(sighting);
-  auto [state, first, steps] = prepareFineSearch(sighting, prior, start);
+  Refined refined;
+  refine(sighting, start, refined);
+  return refined;
+}
 
-  Expectation expectation(source_, sighting, *this);
+void Refinement::refine(const Sighting& sighting, const SearchStart& start, Refined& refined) {
+  const PosePrior prior = priorOf(sighting);
+  const auto [first, steps] = prepareFineSearch(sighting, prior, start);
+
+  expectation_.look(sighting);
   solver_.restart(prior);
   const bool points = settings_.correspondence == Correspondence::kPoints;
   const float last = static_cast<float>(settings_.last_sigma) *
                      (sighting.whole && !points ? kWholeSharpness : 1.0F);
   for (int step = 0; step < steps; ++step) {
     const float sigma = annealed(first, last, step, steps * 4 / 5);
-    solver_.solve(expectation.at(state, sigma), trust(sigma), state,
+    solver_.solve(expectation_.at(state_, sigma), trust(sigma), state_,
                   step + 1 < steps ? kStride : 1.0F);
   }
+  refined.pose = state_.pose;
+  refined.coefficients = state_.coefficients;
+  solver_.covarianceFactor(refined.covariance_factor);
   // At the same sigma for whole surfaces and views, to be compared
-  const double fit = expectation.at(state, static_cast<float>(settings_.last_sigma)).fit;
-  return {state.pose, state.coefficients, solver_.covarianceFactor(), fit};
+  refined.fit = expectation_.at(state_, static_cast<float>(settings_.last_sigma)).fit;
 }
 
 double Refinement::flipGain(const Sighting& sighting, const Eigen::Isometry3f& pose) {
   const Sighting few = pickFew(sighting);
   const auto fitAbout = [&](const Eigen::Isometry3f& start) {
-    const Sighting seen = moved(start.inverse(), few);
-    Expectation expectation(coarse_, seen, *this);
-    coarse_solver_.restart(priorOf(seen));
-    CoherentState state;
-    state.displacements.setZero(3, coarse_.size());
-    seekPose(expectation, kFlipSigma, kFlipIterations, state);
-    return expectation.at(state, kNarrowSigma).fit;
+    coarse_expectation_.look(moved(start.inverse(), few));
+    coarse_solver_.restart(priorOf(few));
+    coarse_state_.pose.setIdentity();
+    coarse_state_.displacements.setZero(3, coarse_.size());
+    seekPose(kFlipSigma, kFlipIterations);
+    return coarse_expectation_.at(coarse_state_, kNarrowSigma).fit;
   };
   double best = -std::numeric_limits<double>::infinity();
   for (const Eigen::Isometry3f& flip : flips_) best = std::max(best, fitAbout(pose * flip));

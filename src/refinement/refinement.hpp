@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "coherent_solver.hpp"
-#include "correspondence.hpp"
 #include "displacement_prior.hpp"
+#include "expectation.hpp"
 #include "sighting.hpp"
 #include "unirit/settings.hpp"
 
@@ -45,6 +45,8 @@ class Refinement {
   /// `source`: 3 x N samples of the organ with outward normals.
   Refinement(const PointCloud& source, const RefinementSettings& settings, const Kernels& kernels,
              ThreadTeam& team);
+  Refinement(const Refinement&) = delete;
+  Refinement& operator=(const Refinement&) = delete;
 
   /// `target`: 3 x M samples of what is seen, normals are estimated; its viewpoint in the same
   /// frame, if known.
@@ -52,6 +54,9 @@ class Refinement {
 
   /// What is seen lies about where the source does.
   Refined refine(const Sighting& sighting, const SearchStart& start);
+
+  /// The same, written over an earlier result; from a near start it allocates nothing then.
+  void refine(const Sighting& sighting, const SearchStart& start, Refined& refined);
 
   /// What the fit gains where the organ is flipped, half a turn about a principal axis: the best of
   /// three such starts over `pose`, each moved to where the organ fits best without a displacement.
@@ -64,20 +69,17 @@ class Refinement {
   const PointCloud& source() const { return source_; }
 
  private:
-  class Expectation;
-
-  /// Where the search with all points begins, with what sigma, and how long it takes.
+  /// With what sigma the search with all points begins, and how long it takes.
   struct FineSearch {
-    CoherentState state;
     float first_sigma;
     int iterations;
   };
 
   FineSearch prepareFineSearch(const Sighting& sighting, const PosePrior& prior,
                                const SearchStart& start);
-  CoherentState searchCoarsely(const Sighting& sighting, const PosePrior& prior,
-                               const SearchStart& start, int iterations);
-  void seekPose(Expectation& expectation, float first_sigma, int iterations, CoherentState& state);
+  void searchCoarsely(const Sighting& sighting, const PosePrior& prior, const SearchStart& start,
+                      int iterations);
+  void seekPose(float first_sigma, int iterations);
   Trust trust(float sigma) const;
 
   PointCloud source_;
@@ -89,8 +91,12 @@ class Refinement {
   double area_;
   std::array<Eigen::Isometry3f, 3> flips_;  // half turns about the organ's principal axes
   std::shared_ptr<const DisplacementPrior> prior_;
+  Expectation expectation_;
+  Expectation coarse_expectation_;
   CoherentSolver solver_;
   CoherentSolver coarse_solver_;
+  CoherentState state_;
+  CoherentState coarse_state_;
 };
 
 }  // namespace unirit

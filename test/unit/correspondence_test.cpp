@@ -32,7 +32,8 @@ Eigen::RowVectorXf visibilityOf(const PointCloud& cloud) {
 Correspondences estimated(const PointCloud& moving, const PointCloud& seen,
                           const Attraction& attraction, int threads = 2) {
   ThreadTeam team(threads);
-  CorrespondenceEstimator estimator(seen, selectKernels(), team);
+  CorrespondenceEstimator estimator(selectKernels(), team);
+  estimator.aimAt(seen);
   Correspondences correspondences;
   estimator.estimate(moving, visibilityOf(moving), attraction, correspondences);
   return correspondences;
@@ -90,7 +91,8 @@ TEST(Correspondence, TakeAnyNumberOfTargetPoints) {
 TEST(Correspondence, WithoutSymmetryVisibilityDoesNotMatter) {
   ThreadTeam team(1);
   const PointCloud moving = source(), seen = target(200);
-  CorrespondenceEstimator estimator(seen, selectKernels(), team);
+  CorrespondenceEstimator estimator(selectKernels(), team);
+  estimator.aimAt(seen);
   const auto massAt = [&](float visibility, float symmetry) {
     Correspondences correspondences;
     estimator.estimate(moving, Eigen::RowVectorXf::Constant(moving.size(), visibility),
@@ -204,7 +206,8 @@ TEST_F(CorrespondenceAllocation, NothingIsAllocatedAfterTheFirstCall) {
   const Eigen::RowVectorXf visibility = visibilityOf(moving);
   for (const int threads : {1, 2}) {
     ThreadTeam team(threads);
-    CorrespondenceEstimator estimator(seen, selectKernels(), team);
+    CorrespondenceEstimator estimator(selectKernels(), team);
+    estimator.aimAt(seen);
     Correspondences correspondences;
     const auto estimate = [&] {
       estimator.estimate(moving, visibility, {0.1F, 0.1F, NormalUse::kSigned, 4.0F},

@@ -6,6 +6,7 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 
+#include "allocation_counter.hpp"
 #include "refinement/coherent_field.hpp"
 #include "shapes.hpp"
 #include "unirit/evaluation/pair.hpp"
@@ -202,6 +203,23 @@ TEST(Refinement, HasTheSameBitsForAnyNumberOfThreadsAndAnyHistory) {
     again.refine(problem);
     EXPECT_EQ(again.moved, alone.moved);
     EXPECT_EQ(again.refined.covariance_factor, alone.refined.covariance_factor);
+  }
+}
+
+TEST(Refinement, AllocatesNothingFromANearStartAfterTheFirst) {
+  test::requireCounting();
+  for (const Protocol protocol : {Protocol::kResampled, Protocol::kPartial}) {
+    for (const int threads : {1, 2}) {
+      const Problem problem(pairOf("liver", protocol, 1));
+      Outcome found(problem, {}, threads);
+      const SearchStart near{found.refined.pose,
+                             found.refinement.prior()->displacements(problem.source.points,
+                                                                     found.refined.coefficients),
+                             true};
+      const auto refine = [&] { found.refinement.refine(found.sighting, near, found.refined); };
+      refine();
+      EXPECT_EQ(test::countAllocations(refine), 0) << toString(protocol) << ' ' << threads;
+    }
   }
 }
 
