@@ -8,9 +8,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include "organ_model.hpp"
 #include "refinement/coherent_field.hpp"
-#include "refinement/refinement.hpp"
-#include "unirit/normals.hpp"
 #include "unirit/plausibility.hpp"
 #include "unirit/sampling.hpp"
 
@@ -30,12 +29,6 @@ PointCloud dropInvalid(const PointCloud& cloud) {
   }
   return {select(cloud.points, valid),
           cloud.normals.cols() == 0 ? Points() : select(cloud.normals, valid), cloud.viewpoint};
-}
-
-/// The cloud's own normals, or estimated ones turned outwards.
-Points normalsOf(const PointCloud& cloud, const std::vector<Eigen::Index>& samples) {
-  if (cloud.normals.cols() > 0) return select(cloud.normals, samples);
-  return outwardNormals(select(cloud.points, samples));
 }
 
 /// Runs a stage, or more of it, and notes how long it took.
@@ -84,16 +77,12 @@ void keepBetter(const Refined& other, bool whole, Refined& refined) {
 }  // namespace
 
 struct Registrar::Implementation {
-  /// The organ, sampled and normalised: what does not change from one view to the next.
-  struct Model {
-    PointCloud cloud;    // as given
-    Points samples;      // N points of it
-    PointCloud sampled;  // the same with normals, the network's unit
-    Points vertices;     // every point, the network's unit
-    Normalisation normalisation;
-    double extent = 0.0;  // [m]
-    std::unique_ptr<Refinement> refinement;
-    Eigen::MatrixXf functions;  // the refinement's prior's, at every point
+  /// In the network's unit and the organ's frame, as the guess has it.
+  struct Found {
+    Eigen::Isometry3f rigid = Eigen::Isometry3f::Identity();
+    Points displacements;  // of the network, at every point of the organ where nothing was refined
+    Sighting sighting;     // where something was
+    std::optional<Refined> refined;
   };
 
   Implementation(std::shared_ptr<const Weights> new_weights,
@@ -103,73 +92,62 @@ struct Registrar::Implementation {
         network(weights, settings.network, settings.threads),
         team(settings.threads) {}
 
-  void prepare(const PointCloud& preoperative) {
-    if (model && model->cloud.points.cols() == preoperative.points.cols() &&
-        model->cloud.points == preoperative.points &&
-        model->cloud.normals.cols() == preoperative.normals.cols() &&
-        model->cloud.normals == preoperative.normals) {
-      return;
-    }
-    auto fresh = std::make_unique<Model>();
-    fresh->cloud = preoperative;
-    fresh->extent = unirit::extent(preoperative.points);
-    const auto samples = sampleEvenly(preoperative.points, settings.sampling.points);
-    fresh->samples = select(preoperative.points, samples);
-    fresh->normalisation = Normalisation::of(fresh->samples);
-    fresh->sampled = {fresh->normalisation.apply(fresh->samples), normalsOf(preoperative, samples)};
-    fresh->vertices = fresh->normalisation.apply(preoperative.points);
-    if (contains(settings.stages, Stage::kRefine)) {
-      fresh->refinement =
-          std::make_unique<Refinement>(fresh->sampled, settings.refinement, selectKernels(), team);
-      fresh->functions = fresh->refinement->prior()->functions(fresh->vertices, team);
-    }
-    model = std::move(fresh);
-  }
-
   Registration run(const PointCloud& preoperative, const PointCloud& intraoperative,
                    const Eigen::Isometry3d& guess, const Earlier* earlier);
+  Found search(const PointCloud& target, const Eigen::Isometry3d& guess, const Earlier* earlier,
+               std::vector<StageTime>& stages);
+  void describe(const Found& found, const Eigen::Isometry3d& guess,
+                const PointCloud& intraoperative, Registration& registration);
+  void judge(const Found& found, const Points& target, const Eigen::Isometry3d& guess,
+             const Earlier* earlier, Registration& registration);
 
-  PointCloud sample(const PointCloud& cloud, const Eigen::Isometry3d& T_organ_cloud) const;
   Refined refineFrom(const Eigen::Isometry3f& start, const Sighting& sighting,
                      const Points& displacements);
   Refined refineFromStart(const Sighting& sighting, const Eigen::Isometry3d& guess,
                           const Earlier* earlier);
-  RefinementQuality qualityOf(const Refined& refined, const Sighting& sighting,
-                              const Deformation& deformation, bool cold) const;
-  Eigen::Isometry3d toMetres(const Eigen::Isometry3f& pose) const;
-  Eigen::Isometry3f startOf(const Eigen::Isometry3d& guess, const Earlier& earlier) const;
-  std::shared_ptr<const Deformation> deformationOf(const PointCloud& preoperative,
+  RefinementQuality qualityOf(const Found& found, const Deformation& deformation, bool cold);
+  Eigen::Isometry3f startOf(const Eigen::Isometry3d& guess, const Earlier* earlier) const;
+  std::shared_ptr<const Deformation> deformationOf(const Found& found,
                                                    const Eigen::Isometry3d& pose,
-                                                   const Points& displacements,
-                                                   const Eigen::Matrix3f& turn,
-                                                   const std::optional<Refined>& refined);
+                                                   const Eigen::Matrix3f& turn);
 
   std::shared_ptr<const Weights> weights;
   RegistrationSettings settings;
   Network network;
   ThreadTeam team;  // the refinement's
-  std::unique_ptr<Model> model;
+  std::unique_ptr<OrganModel> model;
 };
 
-/// The paper's figure: sample, normalise, move rigidly, displace, map back to metres. Where the
-/// refinement fits well from the start, the network's modules are passed over.
+/// The paper's figure: sample, normalise, move rigidly, displace, map back to metres.
 Registration Registrar::Implementation::run(const PointCloud& preoperative,
                                             const PointCloud& intraoperative,
                                             const Eigen::Isometry3d& guess,
                                             const Earlier* earlier) {
   Registration registration = ended(Status::kSucceeded, "registered");
-  auto& stages = registration.stages;
-
-  // Bring the seen cloud to the organ's frame, sample both
-  PointCloud target;
-  timed("sampling", stages, [&] {
-    prepare(preoperative);
-    target = sample(intraoperative, guess.inverse());
+  PointCloud target;  // the seen cloud, in the organ's frame
+  timed("sampling", registration.stages, [&] {
+    if (!model || !model->isOf(preoperative)) {
+      model = std::make_unique<OrganModel>(preoperative, settings, team);
+    }
+    target = model->sample(intraoperative, guess.inverse());
   });
+  const Found found = search(target, guess, earlier, registration.stages);
+  timed("assessment", registration.stages, [&] {
+    describe(found, guess, intraoperative, registration);
+    judge(found, target.points, guess, earlier, registration);
+  });
+  return registration;
+}
+
+/// Where the refinement fits well from the start, the network's modules are passed over.
+Registrar::Implementation::Found Registrar::Implementation::search(const PointCloud& target,
+                                                                   const Eigen::Isometry3d& guess,
+                                                                   const Earlier* earlier,
+                                                                   std::vector<StageTime>& stages) {
+  Found found;
+  auto& [rigid, displacements, sighting, refined] = found;
 
   // Refinement from the start
-  std::optional<Refined> refined;
-  Sighting sighting;
   const bool refines = contains(settings.stages, Stage::kRefine);
   if (refines) {
     timed("refine", stages, [&] {
@@ -180,7 +158,6 @@ Registration Registrar::Implementation::run(const PointCloud& preoperative,
   const bool fits = refined && refined->fit > kPoorFit;
 
   // Rigid module
-  Eigen::Isometry3f rigid = Eigen::Isometry3f::Identity();
   if (contains(settings.stages, Stage::kRigid) && !fits) {
     timed("rigid", stages,
           [&] { rigid = network.estimateRigid(model->sampled.points, target.points); });
@@ -188,7 +165,7 @@ Registration Registrar::Implementation::run(const PointCloud& preoperative,
 
   // Non-rigid module, decoded at every point of the organ or where the refinement starts from
   const Points& queries = refines ? model->sampled.points : model->vertices;
-  Points displacements = Points::Zero(3, queries.cols());
+  displacements.setZero(3, queries.cols());
   if (contains(settings.stages, Stage::kNonRigid) && !fits) {
     timed("nonrigid", stages, [&] {
       displacements = network.estimateDisplacements(rigid * model->sampled.points, target.points,
@@ -203,46 +180,36 @@ Registration Registrar::Implementation::run(const PointCloud& preoperative,
     });
   }
   if (refined) rigid = refined->pose;
-
-  timed("assessment", stages, [&] {
-    registration.T_intraoperative_preoperative = guess * toMetres(rigid);
-    registration.next_guess = guess * toMetres(beyondExpectation(rigid));
-    registration.deformation =
-        deformationOf(preoperative, registration.T_intraoperative_preoperative, displacements,
-                      guess.linear().cast<float>(), refined);
-    registration.residual =
-        surfaceResidual(registration.deformation->movedSurface(), intraoperative.points,
-                        settings.plausibility.inlier_tolerance);
-    registration.displacement =
-        displacementStatistics(registration.deformation->displacements(),
-                               registration.deformation->jacobians(model->samples));
-    if (refined && settings.refinement.correspondence == Correspondence::kSurface) {
-      registration.refinement =
-          qualityOf(*refined, sighting, *registration.deformation, earlier == nullptr);
-    }
-    const Eigen::Isometry3d start =
-        earlier == nullptr ? guess : earlier->T_intraoperative_preoperative;
-    const Eigen::Isometry3f predicted =
-        earlier == nullptr ? Eigen::Isometry3f::Identity() : startOf(guess, *earlier);
-    applyChecks({checkOverlap(predicted * model->sampled.points, target.points,
-                              model->extent / model->normalisation.scale, settings.plausibility)},
-                registration);
-    applyChecks(checkOutput(registration, start, model->extent, settings.plausibility),
-                registration);
-  });
-  return registration;
+  return found;
 }
 
-/// The seen cloud in the network's unit and, where its viewpoint is known, that too.
-PointCloud Registrar::Implementation::sample(const PointCloud& cloud,
-                                             const Eigen::Isometry3d& T_organ_cloud) const {
-  const auto toNetwork = [&](const Points& points) {
-    return model->normalisation.apply(moved(T_organ_cloud, points));
-  };
-  PointCloud sampled{
-      toNetwork(select(cloud.points, sampleEvenly(cloud.points, settings.sampling.points))), {}};
-  if (cloud.viewpoint) sampled.viewpoint = toNetwork(*cloud.viewpoint);
-  return sampled;
+/// What was found, in metres, and how it compares with the cloud.
+void Registrar::Implementation::describe(const Found& found, const Eigen::Isometry3d& guess,
+                                         const PointCloud& intraoperative,
+                                         Registration& registration) {
+  const Eigen::Isometry3d pose = guess * model->toMetres(found.rigid);
+  registration.T_intraoperative_preoperative = pose;
+  registration.next_guess = guess * model->toMetres(beyondExpectation(found.rigid));
+  registration.deformation = deformationOf(found, pose, guess.linear().cast<float>());
+  const Deformation& deformation = *registration.deformation;
+  registration.residual = surfaceResidual(deformation.movedSurface(), intraoperative.points,
+                                          settings.plausibility.inlier_tolerance);
+  registration.displacement =
+      displacementStatistics(deformation.displacements(), deformation.jacobians(model->samples));
+}
+
+void Registrar::Implementation::judge(const Found& found, const Points& target,
+                                      const Eigen::Isometry3d& guess, const Earlier* earlier,
+                                      Registration& registration) {
+  if (found.refined && settings.refinement.correspondence == Correspondence::kSurface) {
+    registration.refinement = qualityOf(found, *registration.deformation, earlier == nullptr);
+  }
+  const Eigen::Isometry3d start =
+      earlier == nullptr ? guess : earlier->T_intraoperative_preoperative;
+  applyChecks({checkOverlap(startOf(guess, earlier) * model->sampled.points, target,
+                            model->extent / model->normalisation.scale, settings.plausibility)},
+              registration);
+  applyChecks(checkOutput(registration, start, model->extent, settings.plausibility), registration);
 }
 
 /// The refinement from a pose, and about it; displacements of the samples after it.
@@ -271,53 +238,41 @@ Refined Registrar::Implementation::refineFromStart(const Sighting& sighting,
   const Points moved = found.move(model->samples) - found.moveRigidly(model->samples);
   const Eigen::Matrix3f to_organ = found.rigidTransform().linear().transpose().cast<float>();
   Refined refined = model->refinement->refine(
-      sighting, {startOf(guess, *earlier), to_organ * moved / model->normalisation.scale, true});
+      sighting, {startOf(guess, earlier), to_organ * moved / model->normalisation.scale, true});
   if (refined.fit < kPoorFit) keepBetter(afar(), sighting.whole, refined);
   return refined;
 }
 
-RefinementQuality Registrar::Implementation::qualityOf(const Refined& refined,
-                                                       const Sighting& sighting,
-                                                       const Deformation& deformation,
-                                                       bool cold) const {
-  const Agreement agreement = model->refinement->agreement(sighting, refined);
+RefinementQuality Registrar::Implementation::qualityOf(const Found& found,
+                                                       const Deformation& deformation, bool cold) {
+  const Refined& refined = *found.refined;
+  const Agreement agreement = model->refinement->agreement(found.sighting, refined);
   RefinementQuality quality{refined.fit, surprise(refined), agreement.missing,
                             deformation.confidence(model->samples).mean(), agreement.residual_left};
-  if (cold) quality.flip_gain = model->refinement->flipGain(sighting, refined.pose);
+  if (cold) quality.flip_gain = model->refinement->flipGain(found.sighting, refined.pose);
   return quality;
 }
 
-Eigen::Isometry3d Registrar::Implementation::toMetres(const Eigen::Isometry3f& pose) const {
-  const auto scale = static_cast<double>(model->normalisation.scale);
-  const Eigen::Vector3d offset = model->normalisation.offset.cast<double>();
-  Eigen::Isometry3d moved = pose.cast<double>();
-  moved.linear() = Eigen::Quaterniond(moved.linear()).normalized().toRotationMatrix();
-  moved.translation() = scale * moved.translation() + offset - moved.linear() * offset;
-  return moved;
-}
-
-/// The earlier pose from the guess, in the network's unit.
+/// Where the search begins, from the guess and in the network's unit.
 Eigen::Isometry3f Registrar::Implementation::startOf(const Eigen::Isometry3d& guess,
-                                                     const Earlier& earlier) const {
-  const Eigen::Vector3d offset = model->normalisation.offset.cast<double>();
-  Eigen::Isometry3d pose = guess.inverse() * earlier.T_intraoperative_preoperative;
-  pose.translation() = (pose * offset - offset) / static_cast<double>(model->normalisation.scale);
-  return pose.cast<float>();
+                                                     const Earlier* earlier) const {
+  if (earlier == nullptr) return Eigen::Isometry3f::Identity();
+  return model->toUnit(guess.inverse() * earlier->T_intraoperative_preoperative);
 }
 
-/// `displacements`: of every point of the organ, in the network's unit, where nothing was refined.
+/// `turn`: the guess's rotation.
 std::shared_ptr<const Deformation> Registrar::Implementation::deformationOf(
-    const PointCloud& preoperative, const Eigen::Isometry3d& pose, const Points& displacements,
-    const Eigen::Matrix3f& turn, const std::optional<Refined>& refined) {
-  if (refined) {
-    const auto field = std::make_shared<const CoherentField>(
-        model->refinement->prior(), model->normalisation, pose.linear().cast<float>(),
-        refined->coefficients, refined->covariance_factor);
-    return std::make_shared<const Deformation>(pose, preoperative.points, field,
-                                               field->valuesAt(model->functions, team));
+    const Found& found, const Eigen::Isometry3d& pose, const Eigen::Matrix3f& turn) {
+  const Points& vertices = model->cloud.points;
+  if (!found.refined) {
+    return std::make_shared<const Deformation>(
+        pose, vertices, turn * found.displacements * model->normalisation.scale);
   }
-  return std::make_shared<const Deformation>(pose, preoperative.points,
-                                             turn * displacements * model->normalisation.scale);
+  const auto field = std::make_shared<const CoherentField>(
+      model->refinement->prior(), model->normalisation, pose.linear().cast<float>(),
+      found.refined->coefficients, found.refined->covariance_factor);
+  return std::make_shared<const Deformation>(pose, vertices, field,
+                                             field->valuesAt(model->functions, team));
 }
 
 Registrar::Registrar(std::shared_ptr<const Weights> weights, const RegistrationSettings& settings) {
