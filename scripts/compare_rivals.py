@@ -47,13 +47,15 @@ def build(cpd, bcpd, folder):
                     f"-lopenblas -lm -o '{folder}/bcpd'")
 
 
-def write_clouds(case, folder):
-    source, target = (read_ply(f"{case}/{name}.ply")[:POINTS].astype(float)
+def write_clouds(case, folder, points, together=False):
+    """As text; `together`: with their centroids at one place."""
+    source, target = (read_ply(f"{case}/{name}.ply")[:points].astype(float)
                       for name in ("source", "target"))
     centre = source.mean(0)
     radius = np.sqrt(((source - centre) ** 2).sum(1).mean())
     np.savetxt(f"{folder}/source", (source - centre) / radius, fmt="%.9f")
-    np.savetxt(f"{folder}/target", (target - centre) / radius, fmt="%.9f")
+    other = target.mean(0) if together else centre
+    np.savetxt(f"{folder}/target", (target - other) / radius, fmt="%.9f")
 
 
 def options(settings):
@@ -67,11 +69,13 @@ def ours(program, method, settings, folder):
 
 
 def theirs(method, s, iterations, folder):
+    """The source as the origin moves it; with 0 iterations it ends where its own criterion says."""
     source, target, output = (f"{folder}/{name}" for name in ("source", "target", "theirs"))
     if method == "bcpd":
         run(f"{folder}/bcpd", "-y", source, "-x", target, "-u", "n", "-q", "-o", f"{folder}/b_",
             "-b", s["beta"], "-l", s["lambda"], "-w", s["omega"], "-g", s["gamma"],
-            "-T", "srn" if s["scale"] else "rn", "-n", iterations, "-N", iterations)
+            "-T", "srn" if s["scale"] else "rn",
+            *(("-n", iterations, "-N", iterations) if iterations > 0 else ()))
         return np.loadtxt(f"{folder}/b_y.txt")
     if method == "cpd-rigid":
         run(f"{folder}/cpd_program", "rigid", source, target, output, s["w"], iterations)
@@ -91,7 +95,7 @@ def compare(program, cases, folder):
     for method, settings in runs:
         largest = dict.fromkeys(ITERATIONS, 0.0)
         for case in cases:
-            write_clouds(case, folder)
+            write_clouds(case, folder, POINTS)
             for iterations in ITERATIONS:
                 fixed = {"iterations": iterations}
                 fixed["settling" if method == "bcpd" else "tolerance"] = \

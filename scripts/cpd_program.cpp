@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // A command line for the library gadomski/cpd, which has none:
 // cpd_program rigid|nonrigid SOURCE TARGET OUTPUT W ITERATIONS [BETA LAMBDA]
+// ITERATIONS of 0: as many as the library itself would take.
 #include <cpd/gauss_transform.hpp>
 #include <cpd/nonrigid.hpp>
 #include <cpd/rigid.hpp>
@@ -13,8 +14,10 @@ int main(int argc, char** argv) {
   const auto configure = [&](auto& transform) {
     transform.normalize(false);  // clouds are compared as they are
     transform.outliers(std::stod(argv[5]));
-    transform.max_iterations(std::stod(argv[6]));
-    transform.tolerance(0.0);
+    if (const double iterations = std::stod(argv[6]); iterations > 0.0) {
+      transform.max_iterations(iterations);
+      transform.tolerance(0.0);
+    }
     transform.gauss_transform(std::make_unique<cpd::GaussTransformDirect>());
   };
   const cpd::Matrix source = cpd::matrix_from_path(argv[2]);
