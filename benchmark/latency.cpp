@@ -48,8 +48,8 @@ std::vector<sensor_msgs::PointCloud2> film(const Surface& organ, int points) {
     now.vertices.points = motion.at(organ.vertices.points, kFramePeriod * frame);
     Points seen = sampleByArea(now, points, static_cast<std::uint64_t>(frame)).points;
     Random random(static_cast<std::uint64_t>(frame));
-    for (float& coordinate : seen.reshaped()) {
-      coordinate += static_cast<float>(kNoise * random.normal());
+    for (Eigen::Index k = 0; k < seen.size(); ++k) {
+      seen.data()[k] += static_cast<float>(kNoise * random.normal());
     }
     frames.push_back(toMessage(seen, header("camera")));
   }

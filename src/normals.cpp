@@ -36,8 +36,8 @@ Points normalsAmong(const Eigen::MatrixXi& nearest, const Points& points) {
   for (Eigen::Index i = 0; i < points.cols(); ++i) {
     Eigen::Vector3f sum = Eigen::Vector3f::Zero();
     Eigen::Matrix3f scatter = Eigen::Matrix3f::Zero();
-    for (const int j : nearest.col(i)) {
-      const Eigen::Vector3f offset = points.col(j) - points.col(i);
+    for (Eigen::Index k = 0; k < nearest.rows(); ++k) {
+      const Eigen::Vector3f offset = points.col(nearest(k, i)) - points.col(i);
       sum += offset;
       scatter += offset * offset.transpose();
     }
@@ -54,11 +54,12 @@ class NeighbourGraph {
   explicit NeighbourGraph(const Eigen::MatrixXi& nearest)
       : begins_(at(nearest.cols()) + 1, nearest.rows()), joined_(at(2 * nearest.size())) {
     begins_.back() = 0;
-    for (const int j : nearest.reshaped()) ++begins_[at(j)];
+    for (Eigen::Index k = 0; k < nearest.size(); ++k) ++begins_[at(nearest.data()[k])];
     // Ends at first; filling from the back turns them into beginnings
     std::partial_sum(begins_.begin(), begins_.end(), begins_.begin());
     for (Eigen::Index i = 0; i < nearest.cols(); ++i) {
-      for (const int j : nearest.col(i)) {
+      for (Eigen::Index k = 0; k < nearest.rows(); ++k) {
+        const int j = nearest(k, i);
         joined_[at(--begins_[at(i)])] = j;
         joined_[at(--begins_[at(j)])] = static_cast<int>(i);
       }
@@ -185,9 +186,9 @@ Points vertexNormals(const Surface& mesh) {
     const Eigen::Vector3i face = mesh.faces.col(f);
     const Eigen::Vector3f a = vertices.col(face[0]);
     const Eigen::Vector3f twice_area = (vertices.col(face[1]) - a).cross(vertices.col(face[2]) - a);
-    for (const int corner : face) normals.col(corner) += twice_area;
+    for (int k = 0; k < 3; ++k) normals.col(face[k]) += twice_area;
   }
-  for (auto normal : normals.colwise()) normal.stableNormalize();
+  for (Eigen::Index i = 0; i < normals.cols(); ++i) normals.col(i).stableNormalize();
   return normals;
 }
 

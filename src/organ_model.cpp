@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "organ_model.hpp"
 
-#include <algorithm>
-
 #include "unirit/normals.hpp"
 #include "unirit/sampling.hpp"
 
@@ -27,8 +25,7 @@ OrganModel::OrganModel(const PointCloud& organ, const RegistrationSettings& sett
   normalisation = Normalisation::of(samples);
   sampled = {normalisation.apply(samples), normalsOf(organ, indices)};
   vertices = normalisation.apply(organ.points);
-  const auto& stages = settings.stages;
-  if (std::find(stages.begin(), stages.end(), Stage::kRefine) == stages.end()) return;
+  if (!settings.runs(Stage::kRefine)) return;
   refinement = std::make_unique<Refinement>(sampled, settings.refinement, selectKernels(), team);
   functions = refinement->prior()->functions(vertices, team);
 }

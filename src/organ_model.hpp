@@ -21,7 +21,7 @@ struct OrganModel {
 
   /// As many points of a cloud as of the organ and, where it is known, its viewpoint; in the
   /// network's unit.
-  PointCloud sample(const PointCloud& cloud, const Eigen::Isometry3d& T_organ_cloud) const;
+  PointCloud sample(const PointCloud& seen, const Eigen::Isometry3d& T_organ_cloud) const;
 
   /// A motion within the organ's frame.
   Eigen::Isometry3d toMetres(const Eigen::Isometry3f& motion) const;

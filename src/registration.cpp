@@ -55,13 +55,6 @@ Registration ended(Status status, std::string message, std::vector<PlausibilityC
   return registration;
 }
 
-bool contains(const std::vector<Stage>& stages, Stage wanted) {
-  for (const Stage stage : stages) {
-    if (stage == wanted) return true;
-  }
-  return false;
-}
-
 /// Of the prior's variance of 1 a coefficient, what is not left after the cloud was seen.
 double surprise(const Refined& refined) {
   const auto prior = static_cast<double>(refined.coefficients.size());
@@ -145,20 +138,22 @@ Registrar::Implementation::Found Registrar::Implementation::search(const PointCl
                                                                    const Earlier* earlier,
                                                                    std::vector<StageTime>& stages) {
   Found found;
-  auto& [rigid, displacements, sighting, refined] = found;
+  Eigen::Isometry3f& rigid = found.rigid;
+  Points& displacements = found.displacements;
+  std::optional<Refined>& refined = found.refined;
 
   // Refinement from the start
-  const bool refines = contains(settings.stages, Stage::kRefine);
+  const bool refines = settings.runs(Stage::kRefine);
   if (refines) {
     timed("refine", stages, [&] {
-      sighting = model->refinement->sight(target);
-      refined = refineFromStart(sighting, guess, earlier);
+      found.sighting = model->refinement->sight(target);
+      refined = refineFromStart(found.sighting, guess, earlier);
     });
   }
   const bool fits = refined && refined->fit > kPoorFit;
 
   // Rigid module
-  if (contains(settings.stages, Stage::kRigid) && !fits) {
+  if (settings.runs(Stage::kRigid) && !fits) {
     timed("rigid", stages,
           [&] { rigid = network.estimateRigid(model->sampled.points, target.points); });
   }
@@ -166,7 +161,7 @@ Registrar::Implementation::Found Registrar::Implementation::search(const PointCl
   // Non-rigid module, decoded at every point of the organ or where the refinement starts from
   const Points& queries = refines ? model->sampled.points : model->vertices;
   displacements.setZero(3, queries.cols());
-  if (contains(settings.stages, Stage::kNonRigid) && !fits) {
+  if (settings.runs(Stage::kNonRigid) && !fits) {
     timed("nonrigid", stages, [&] {
       displacements = network.estimateDisplacements(rigid * model->sampled.points, target.points,
                                                     rigid * queries);
@@ -176,7 +171,7 @@ Registrar::Implementation::Found Registrar::Implementation::search(const PointCl
   // Refinement from where the network left the organ
   if (refined && !fits && settings.stages.front() != Stage::kRefine) {
     timed("refine", stages, [&] {
-      keepBetter(refineFrom(rigid, sighting, displacements), sighting.whole, *refined);
+      keepBetter(refineFrom(rigid, found.sighting, displacements), found.sighting.whole, *refined);
     });
   }
   if (refined) rigid = refined->pose;

@@ -124,7 +124,7 @@ Points select(const Points& points, const std::vector<Eigen::Index>& indices) {
 }
 
 bool lessByCoordinates(const Eigen::Vector3f& a, const Eigen::Vector3f& b) {
-  return std::lexicographical_compare(a.begin(), a.end(), b.begin(), b.end());
+  return std::lexicographical_compare(a.data(), a.data() + 3, b.data(), b.data() + 3);
 }
 
 std::vector<Eigen::Index> sampleEvenly(const Points& points, Eigen::Index count) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "unirit/settings.hpp"
 
+#include <algorithm>
 #include <array>
 #include <nlohmann/json.hpp>
 #include <sstream>
@@ -73,6 +74,10 @@ Correspondence correspondenceFromString(const std::string& name) {
   }
   throw std::invalid_argument("correspondence: unknown correspondence '" + name +
                               "', known are surface, points");
+}
+
+bool RegistrationSettings::runs(Stage stage) const {
+  return std::find(stages.begin(), stages.end(), stage) != stages.end();
 }
 
 std::vector<Stage> stagesFromString(const std::string& comma_separated) {

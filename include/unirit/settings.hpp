@@ -90,6 +90,8 @@ struct RegistrationSettings {
   RefinementSettings refinement;
   PlausibilitySettings plausibility;
   int threads = 2;  ///< worker threads of the network; the result has the same bits for any number
+
+  bool runs(Stage stage) const;  ///< whether the stage is among the chosen
 };
 
 const char* toString(Pairing pairing);

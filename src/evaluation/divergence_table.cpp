@@ -62,7 +62,9 @@ DivergenceTable divergenceTable(const std::vector<LabelledCloud>& clouds,
     Eigen::Index column = row;
     for (auto b = a; b != classes.end(); ++b, ++column) {
       Eigen::ArrayXd means(settings.repeats);
-      for (double& mean : means) mean = drawnMean(a->second, b->second, settings.pairs, random);
+      for (int k = 0; k < settings.repeats; ++k) {
+        means[k] = drawnMean(a->second, b->second, settings.pairs, random);
+      }
       table.mean(row, column) = table.mean(column, row) = means.mean();
       table.spread(row, column) = table.spread(column, row) =
           std::sqrt((means - means.mean()).square().mean());

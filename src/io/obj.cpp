@@ -9,7 +9,7 @@ namespace {
 
 Eigen::Vector3d pointFromLine(std::string_view line) {
   Eigen::Vector3d point;
-  for (double& coordinate : point) coordinate = toNumber(takeWord(line));
+  for (int axis = 0; axis < 3; ++axis) point[axis] = toNumber(takeWord(line));
   return point;
 }
 

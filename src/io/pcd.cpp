@@ -94,8 +94,8 @@ Header takeHeader(std::string_view& file) {
     if (keyword == "HEIGHT") height = toCount(takeWord(line));
     if (keyword == "POINTS") points = toCount(takeWord(line));
     if (keyword == "VIEWPOINT") {
-      header.viewpoint.emplace();
-      for (double& coordinate : *header.viewpoint) coordinate = toNumber(takeWord(line));
+      Eigen::Vector3d& viewpoint = header.viewpoint.emplace();
+      for (int axis = 0; axis < 3; ++axis) viewpoint[axis] = toNumber(takeWord(line));
       if (header.viewpoint->isZero()) header.viewpoint.reset();  // so does who knows of none
     }
     if (keyword == "DATA") header.data = takeWord(line);

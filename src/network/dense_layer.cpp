@@ -27,7 +27,7 @@ DenseLayer::DenseLayer(const Kernels& kernels, const Layer& layer, Activation ac
           layer.weight(output, input);
     }
   }
-  std::copy(layer.bias.begin(), layer.bias.end(), bias_.data());
+  std::copy_n(layer.bias.data(), layer.bias.size(), bias_.data());
   const float floor =
       activation == Activation::kRelu ? 0.0F : -std::numeric_limits<float>::infinity();
   view_ = {panels_.data(), bias_.data(), floor, inputs, panel_count};

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "unirit/network/weights.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <filesystem>
@@ -84,7 +85,8 @@ std::vector<float> readTensor(const TensorFile& file, const std::string& name,
   if (half) {
     std::vector<Half> halves(count);
     std::memcpy(halves.data(), tensor.bytes.data(), tensor.bytes.size());
-    std::copy(halves.begin(), halves.end(), values.begin());
+    std::transform(halves.begin(), halves.end(), values.begin(),
+                   [](Half value) { return static_cast<float>(value); });
   } else {
     std::memcpy(values.data(), tensor.bytes.data(), tensor.bytes.size());
   }
@@ -143,8 +145,8 @@ std::string toHalfBytes(const Matrix& matrix, const std::string& name) {
   const RowMajor values = matrix;
   std::string bytes;
   bytes.reserve(sizeof(Half) * static_cast<std::size_t>(values.size()));
-  for (const float value : values.reshaped<Eigen::RowMajor>()) {
-    const Half half(value);
+  for (Eigen::Index i = 0; i < values.size(); ++i) {
+    const Half half(values.data()[i]);
     if (!(Eigen::numext::isfinite)(half)) {
       throw std::invalid_argument("weights: \"" + name + "\" does not fit in half precision");
     }

@@ -77,8 +77,9 @@ void CorrespondenceEstimator::aimAt(const PointCloud& target) {
   }
   const Eigen::Vector3f middle = centroid(target.points);
   Eigen::Matrix3f covariance = Eigen::Matrix3f::Zero();
-  for (const auto& point : target.points.colwise()) {
-    covariance += (point - middle) * (point - middle).transpose();
+  for (long j = 0; j < target_count_; ++j) {
+    const Eigen::Vector3f offset = target.points.col(j) - middle;
+    covariance += offset * offset.transpose();
   }
   covariance /= static_cast<float>(target_count_);
   covariance.diagonal().array() += kFlatVariance;

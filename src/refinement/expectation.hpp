@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <optional>
+
 #include "coherent_solver.hpp"
 #include "correspondence.hpp"
 #include "sighting.hpp"

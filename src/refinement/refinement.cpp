@@ -97,8 +97,6 @@ Refinement::Refinement(const PointCloud& source, const RefinementSettings& setti
       coarse_samples_(sampleEvenly(source.points, kCoarsePoints)),
       coarse_(pick(source, coarse_samples_)),
       settings_(settings),
-      kernels_(kernels),
-      team_(team),
       area_(sampledArea(source.points)),
       flips_(flipsOf(source.points)),
       prior_(std::make_shared<const DisplacementPrior>(

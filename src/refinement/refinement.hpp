@@ -86,8 +86,6 @@ class Refinement {
   std::vector<Eigen::Index> coarse_samples_;
   PointCloud coarse_;  // a few of the source's points
   RefinementSettings settings_;
-  const Kernels& kernels_;
-  ThreadTeam& team_;
   double area_;
   std::array<Eigen::Isometry3f, 3> flips_;  // half turns about the organ's principal axes
   std::shared_ptr<const DisplacementPrior> prior_;

@@ -189,13 +189,22 @@ PointCloud2 toMessage(const Points& points, const std::vector<PointValues>& valu
   return message;
 }
 
-PointCloud2 toMessage(const Points& points, const std_msgs::Header& header) {
+PointCloud2 toMessage(const PointCloud& cloud, const std_msgs::Header& header) {
   ReceivedCloud all;
-  all.total = points.cols();
-  all.kept.resize(static_cast<std::size_t>(points.cols()));
+  all.total = cloud.size();
+  all.kept.resize(static_cast<std::size_t>(cloud.size()));
   std::iota(all.kept.begin(), all.kept.end(), 0);
-  all.cloud.points = points;
-  return toMessage(points, {}, all, header);
+  std::vector<PointValues> normals;
+  if (cloud.normals.cols() > 0) {
+    normals = {{"normal_x", cloud.normals.row(0)},
+               {"normal_y", cloud.normals.row(1)},
+               {"normal_z", cloud.normals.row(2)}};
+  }
+  return toMessage(cloud.points, normals, all, header);
+}
+
+PointCloud2 toMessage(const Points& points, const std_msgs::Header& header) {
+  return toMessage(PointCloud{points, {}}, header);
 }
 
 PointCloud2 emptyCloud(const std_msgs::Header& header) { return toMessage(Points(3, 0), header); }

@@ -35,7 +35,9 @@ struct PointValues {
 sensor_msgs::PointCloud2 toMessage(const Points& points, const std::vector<PointValues>& values,
                                    const ReceivedCloud& source, const std_msgs::Header& header);
 
-/// Message with x y z [m] for the points, in their order.
+/// Message with x y z [m] for the points, in their order, and normal_x normal_y normal_z where the
+/// cloud has them.
+sensor_msgs::PointCloud2 toMessage(const PointCloud& cloud, const std_msgs::Header& header);
 sensor_msgs::PointCloud2 toMessage(const Points& points, const std_msgs::Header& header);
 
 /// A cloud of no points: takes the place of one that no longer holds.

@@ -19,8 +19,10 @@
 #include "demo_report.hpp"
 #include "demo_scene.hpp"
 #include "names.hpp"
+#include "triangulation.hpp"
 #include "unirit/io/surface_io.hpp"
 #include "unirit/metrics.hpp"
+#include "unirit/normals.hpp"
 #include "unirit/point_cloud.hpp"
 #include "unirit/settings.hpp"
 #include "unirit/simulation/phantom.hpp"
@@ -53,15 +55,28 @@ SceneSettings readSceneSettings(const ros::NodeHandle& nh) {
   return scene;
 }
 
-Surface readOrgan(const std::string& file) {
-  const Surface organ = readSurface(file, kMillimetre).surface;
+void requireOrgan(const Surface& organ, const std::string& file) {
   const double size = extent(organ.vertices.points);
   const PlausibilitySettings limits;
-  if (size >= limits.min_organ_extent && size <= limits.max_organ_extent) return organ;
+  if (size >= limits.min_organ_extent && size <= limits.max_organ_extent) return;
   std::ostringstream sentence;
   sentence << file << " holds an organ of " << size / kMillimetre
            << " mm: is it in another unit than millimetres?";
   throw std::runtime_error(sentence.str());
+}
+
+/// A mesh with the normals of its faces; where the file has no faces, these are made, and the
+/// normals are the file's.
+Surface readOrgan(const std::string& file) {
+  Surface organ = readSurface(file, kMillimetre).surface;
+  requireOrgan(organ, file);
+  if (organ.faces.cols() == 0) {
+    organ.faces = triangulate(organ.vertices.points);
+    return organ;
+  }
+  turnFacesOutwards(organ);
+  organ.vertices.normals = vertexNormals(organ);
+  return organ;
 }
 
 /// The organ of a file, or the phantom of that name where none is given.
@@ -137,7 +152,7 @@ void Demo::publishScene(const Surface& organ) {
   camera.header = header(kWorldFrame, now);
   camera.child_frame_id = kCameraFrame;
   transforms_.sendTransform(camera);
-  preoperative_.publish(toMessage(organ.vertices.points, header(kPreoperativeFrame, now)));
+  preoperative_.publish(toMessage(organ.vertices, header(kPreoperativeFrame, now)));
   shown_ =
       (scene_.cameraPose().inverse() * scene_.roughPose() * organ.vertices.points.cast<double>())
           .cast<float>();

@@ -67,7 +67,7 @@ void deformPoints(const DeformPointsRequest& request, const Acceptance::State& s
     response.points[i].z = point.z();
   }
   const Eigen::RowVectorXf confidence = deformation.confidence(points);
-  response.confidence.assign(confidence.begin(), confidence.end());
+  response.confidence.assign(confidence.data(), confidence.data() + confidence.size());
   response.message = "moved by registration " + std::to_string(result.id);
 }
 

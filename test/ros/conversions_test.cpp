@@ -206,6 +206,16 @@ TEST(ToMessage, isReadBackUnchanged) {
   EXPECT_EQ(fromMessage(written, "cloud").cloud.points, source.cloud.points);
 }
 
+TEST(ToMessage, carriesTheNormalsOfACloudThatHasThem) {
+  PointCloud cloud{Points::Random(3, 5), Points::Random(3, 5)};
+  cloud.normals.colwise().normalize();
+  const PointCloud read = fromMessage(toMessage(cloud, std_msgs::Header()), "cloud").cloud;
+  EXPECT_EQ(read.points, cloud.points);
+  EXPECT_TRUE(read.normals.isApprox(cloud.normals));
+  cloud.normals.resize(3, 0);
+  EXPECT_EQ(toMessage(cloud, std_msgs::Header()).fields.size(), 3U);
+}
+
 TEST(PoseFromMessage, renormalisesAndRefusesWhatIsNoRotation) {
   geometry_msgs::Pose pose;
   pose.orientation.w = 1.005;

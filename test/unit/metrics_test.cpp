@@ -54,14 +54,14 @@ TEST(SurfaceResidual, OfLargeCloudsIsThatOfAllTheirPoints) {
   const Points surface = test::bumpyEllipsoid(70000, 3);
   Points seen = test::bumpyEllipsoid(50000, 4);
   Random random(5);
-  for (float& coordinate : seen.reshaped()) {
-    coordinate += static_cast<float>(0.003 * random.normal());
+  for (Eigen::Index k = 0; k < seen.size(); ++k) {
+    seen.data()[k] += static_cast<float>(0.003 * random.normal());
   }
   const Eigen::RowVectorXf distances = nearestDistances(seen, surface);
   const Eigen::RowVectorXf covered = nearestDistances(surface, seen.leftCols(10000));
   const float tolerance = 0.003F;
   const SurfaceResidual residual = surfaceResidual(surface, seen, tolerance);
-  const std::vector<float> all(distances.begin(), distances.end());
+  const std::vector<float> all(distances.data(), distances.data() + distances.size());
   EXPECT_NEAR(residual.median, quantile(all, 0.5), 1e-4);
   EXPECT_NEAR(residual.p95, quantile(all, 0.95), 3e-4);
   EXPECT_NEAR(residual.inlier_fraction, (distances.array() <= tolerance).cast<double>().mean(),

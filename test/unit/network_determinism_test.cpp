@@ -3,12 +3,12 @@
 
 #include "instruction_set_test.hpp"
 #include "network_reference.hpp"
+#include "unirit/sampling.hpp"
 
 namespace unirit {
 namespace {
 
 using reference::loudWeights;
-using reference::permuted;
 using reference::randomPoints;
 using reference::shuffled;
 
@@ -49,10 +49,10 @@ TEST_P(NetworkDeterminism, theOrderOfTheCloudsChangesNoBit) {
     pairing_ = pairing;
     const Output straight = run(source_, target_, queries_);
     const Output shuffled_output =
-        run(permuted(source_, shuffled(source_.cols(), 4)),
-            permuted(target_, shuffled(target_.cols(), 5)), permuted(queries_, query_order));
+        run(select(source_, shuffled(source_.cols(), 4)),
+            select(target_, shuffled(target_.cols(), 5)), select(queries_, query_order));
     EXPECT_EQ(shuffled_output.transform, straight.transform);
-    EXPECT_EQ(shuffled_output.displacements, permuted(straight.displacements, query_order));
+    EXPECT_EQ(shuffled_output.displacements, select(straight.displacements, query_order));
   }
 }
 
@@ -61,10 +61,10 @@ TEST_P(NetworkDeterminism, withPairingRowTheOrderOfTheTargetDecides) {
   const Points target = randomPoints(source_.cols(), 2);
   const auto order = shuffled(source_.cols(), 4);
   const Output straight = run(source_, target, source_);
-  const Points moved = permuted(source_, order);
-  EXPECT_EQ(run(moved, permuted(target, order), moved).displacements,
-            permuted(straight.displacements, order));
-  EXPECT_NE(run(source_, permuted(target, order), source_).displacements, straight.displacements);
+  const Points moved = select(source_, order);
+  EXPECT_EQ(run(moved, select(target, order), moved).displacements,
+            select(straight.displacements, order));
+  EXPECT_NE(run(source_, select(target, order), source_).displacements, straight.displacements);
 }
 
 TEST_P(NetworkDeterminism, aTieOfNearestTargetsDoesNotDependOnTheirOrder) {

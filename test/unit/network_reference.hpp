@@ -89,8 +89,8 @@ inline std::shared_ptr<const Weights> makeLoudWeights(Pairing pairing) {
   auto weights = std::make_shared<Weights>(randomWeights(pairing, 11));
   Random random(12);
   for (auto& [name, layer] : weights->layers) {
-    for (float& bias : layer.bias) {
-      bias += static_cast<float>(0.1 * random.normal());
+    for (Eigen::Index k = 0; k < layer.bias.size(); ++k) {
+      layer.bias[k] += static_cast<float>(0.1 * random.normal());
     }
   }
   weights->layers.at("nonrigid.decoder.5").weight *= 20.0F;
@@ -121,10 +121,6 @@ inline std::vector<Eigen::Index> shuffled(Eigen::Index count, std::uint64_t seed
     std::swap(order[i - 1], order[static_cast<std::size_t>(random.below(static_cast<long>(i)))]);
   }
   return order;
-}
-
-inline Points permuted(const Points& points, const std::vector<Eigen::Index>& order) {
-  return points(Eigen::all, order);
 }
 
 }  // namespace unirit::reference

@@ -64,8 +64,8 @@ std::vector<float> angles(const Points& normals, const Points& expected) {
 
 Points flippedAtRandom(Points normals) {
   Random random(7);
-  for (auto normal : normals.colwise()) {
-    if (random.uniform() < 0.5) normal *= -1.0F;
+  for (Eigen::Index i = 0; i < normals.cols(); ++i) {
+    if (random.uniform() < 0.5) normals.col(i) *= -1.0F;
   }
   return normals;
 }

@@ -186,7 +186,9 @@ TEST(Preprocessing, keepsOnePointOfEachVoxelAndCoversTheSurface) {
   EXPECT_LT(left.cols(), 10000);
   const Eigen::Matrix3Xi cells = (left.cast<double>() / edge).array().floor().cast<int>();
   std::set<std::tuple<int, int, int>> seen;
-  for (const auto& cell : cells.colwise()) seen.emplace(cell.x(), cell.y(), cell.z());
+  for (Eigen::Index i = 0; i < cells.cols(); ++i) {
+    seen.emplace(cells(0, i), cells(1, i), cells(2, i));
+  }
   EXPECT_EQ(static_cast<Eigen::Index>(seen.size()), left.cols());
   EXPECT_EQ(nearestDistances(left, dense).maxCoeff(), 0.0F) << "points of the cloud, not means";
   EXPECT_LT(nearestDistances(dense, left).maxCoeff(), std::sqrt(3.0) * edge);

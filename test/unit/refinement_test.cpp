@@ -206,8 +206,12 @@ TEST(Refinement, HasTheSameBitsForAnyNumberOfThreadsAndAnyHistory) {
   }
 }
 
-TEST(Refinement, AllocatesNothingFromANearStartAfterTheFirst) {
-  test::requireCounting();
+class RefinementAllocation : public testing::Test {
+ protected:
+  void SetUp() override { test::requireCounting(); }
+};
+
+TEST_F(RefinementAllocation, IsNoneFromANearStartAfterTheFirst) {
   for (const Protocol protocol : {Protocol::kResampled, Protocol::kPartial}) {
     for (const int threads : {1, 2}) {
       const Problem problem(pairOf("liver", protocol, 1));
@@ -286,7 +290,7 @@ TEST(CoherentField, IsSurerOfWhatWasSeen) {
     EXPECT_GE(confidence.minCoeff(), 0.0F);
     EXPECT_LE(confidence.maxCoeff(), 1.0F);
     const Eigen::RowVectorXf distances = nearestDistances(pair.truth, pair.target);
-    const std::vector<float> values(distances.begin(), distances.end());
+    const std::vector<float> values(distances.data(), distances.data() + distances.size());
     const auto meanWhere = [&](const auto& chosen) {
       return (confidence.array() * chosen.template cast<float>()).sum() /
              static_cast<float>(chosen.count());

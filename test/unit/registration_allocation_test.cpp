@@ -9,8 +9,9 @@ namespace {
 
 using test::countAllocations;
 
-/// What a call hands over (the deformation, checks, stage times) and what looking at its cloud takes
-/// (samples, neighbours, normals); the refinement from a near start takes nothing, see its own test.
+/// What a call hands over (the deformation, checks, stage times) and what looking at its cloud
+/// takes (samples, neighbours, normals); the search from a near start takes nothing, see
+/// refinement_test.
 constexpr long kOfACall = 310;
 constexpr double kTreeVaries = 10;  // k-d trees take as many blocks as their points call for
 

@@ -77,6 +77,17 @@ TEST(WarmStart, IsAsAccurateAsAColdOne) {
   }
 }
 
+TEST(WarmStart, IsNotAskedWhetherTheOrganFitsBetterFlipped) {
+  const RegistrationPair pair = pairOf("liver", Protocol::kPartial);
+  Stream stream(pair);
+  const Registration cold = stream.next(pair);
+  ASSERT_TRUE(cold.refinement && cold.refinement->flip_gain);
+  EXPECT_LT(*cold.refinement->flip_gain, 0.0);
+  const Registration warm = stream.next(pair, cold);
+  ASSERT_TRUE(warm.refinement);
+  EXPECT_FALSE(warm.refinement->flip_gain);
+}
+
 TEST(WarmStart, BeginsWhereTheRegistrationBeforeEnded) {
   const RegistrationPair pair = pairOf("liver", Protocol::kResampled);
   Stream stream(pair, 1);
