@@ -47,15 +47,16 @@ def build(cpd, bcpd, folder):
                     f"-lopenblas -lm -o '{folder}/bcpd'")
 
 
-def write_clouds(case, folder, points, together=False):
-    """As text; `together`: with their centroids at one place."""
+def write_clouds(case, folder, points, together=False, coordinates=1):
+    """As text, in units of the source's RMS radius over the root of `coordinates`; `together`: with
+    their centroids at one place."""
     source, target = (read_ply(f"{case}/{name}.ply")[:points].astype(float)
                       for name in ("source", "target"))
     centre = source.mean(0)
-    radius = np.sqrt(((source - centre) ** 2).sum(1).mean())
-    np.savetxt(f"{folder}/source", (source - centre) / radius, fmt="%.9f")
+    unit = np.sqrt(((source - centre) ** 2).sum(1).mean() / coordinates)
+    np.savetxt(f"{folder}/source", (source - centre) / unit, fmt="%.9f")
     other = target.mean(0) if together else centre
-    np.savetxt(f"{folder}/target", (target - other) / radius, fmt="%.9f")
+    np.savetxt(f"{folder}/target", (target - other) / unit, fmt="%.9f")
 
 
 def options(settings):
@@ -68,14 +69,14 @@ def ours(program, method, settings, folder):
     return np.loadtxt(f"{folder}/ours")
 
 
-def theirs(method, s, iterations, folder):
-    """The source as the origin moves it; with 0 iterations it ends where its own criterion says."""
+def theirs(method, s, iterations, folder, options=()):
+    """The source as the origin moves it; with 0 iterations it ends where it would by itself."""
     source, target, output = (f"{folder}/{name}" for name in ("source", "target", "theirs"))
     if method == "bcpd":
         run(f"{folder}/bcpd", "-y", source, "-x", target, "-u", "n", "-q", "-o", f"{folder}/b_",
             "-b", s["beta"], "-l", s["lambda"], "-w", s["omega"], "-g", s["gamma"],
             "-T", "srn" if s["scale"] else "rn",
-            *(("-n", iterations, "-N", iterations) if iterations > 0 else ()))
+            *(("-n", iterations, "-N", iterations) if iterations > 0 else ()), *options)
         return np.loadtxt(f"{folder}/b_y.txt")
     if method == "cpd-rigid":
         run(f"{folder}/cpd_program", "rigid", source, target, output, s["w"], iterations)

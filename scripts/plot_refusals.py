@@ -36,9 +36,10 @@ SETTINGS = {
     "residual over that of the rigid part": "max_residual_left",
     "overlap of the cloud with the predicted region": "min_overlap",
 }
-TELLING = list(SETTINGS)[:3]
-JOINT = DESIGNED + [name for name, setting in SETTINGS.items()
-                    if setting in ("max_residual_p95", "max_surprise", "max_displacement")]  # what the joint check is made of
+TELLING = ["95th percentile of the surface residual over extent", "surprise of the displacement",
+           "gain in fit of the organ flipped"]
+# What the joint check is made of
+JOINT = DESIGNED + TELLING[:2] + ["largest displacement over extent"]
 JOINT_NAME = "joint closeness to the limits"
 
 
@@ -182,7 +183,7 @@ def draw_limits(data):
         limit = np.quantile(data.values[right, i], 1.0 - QUANTILE if low else QUANTILE)
         if name not in TELLING:
             limit *= 1.0 / ROOM if low else ROOM
-        data.limits[i] = round_up(limit, low)
+        data.limits[i] = max(0.0, round_up(limit, low))
     columns = [data.checks.index(name) for name in JOINT]
     joint = data.checks.index(JOINT_NAME)
     closeness = data.closeness()[right]
