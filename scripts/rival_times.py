@@ -8,9 +8,9 @@ CPD and BCPD are checkouts as for compare_rivals.py, UNIRIT_BENCHMARK the progra
 CASES a folder of cases as it reads them. Every EVERY-th case of each protocol is registered by the
 refinement, by the rivals of the benchmark and by the programs they come from, BCPD without and with
 its acceleration, with the parameters tuned for the protocol, on one thread, each until its own
-criterion or limit of iterations ends it. Prints the mean
-processor time of a registration: of a program from its start, reading and writing of text included
-(some milliseconds); of the refinement with what is computed once for an organ.
+criterion or limit of iterations ends it. Prints the mean processor time of a registration: of a
+program from its start, reading and writing of text included (some milliseconds); of the refinement
+with what is computed once for an organ.
 """
 import csv
 import os
