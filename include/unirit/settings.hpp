@@ -59,7 +59,7 @@ struct PlausibilitySettings {
   double max_organ_extent = 1.0;    ///< same, from above [m]
   double min_extent_ratio = 0.1;    ///< extent of the intra-operative cloud over the organ's
   double max_extent_ratio = 3.0;    ///< same, from above
-  double min_overlap = 0.388;       ///< share of the cloud within a tenth of the extent of where
+  double min_overlap = 0.363;       ///< share of the cloud within a tenth of the extent of where
                                     ///< the start has the organ
   double inlier_tolerance = 0.005;  ///< cloud points nearer than this are inliers [m]
   double max_residual = 0.06;       ///< median distance of cloud to moved surface, over extent
@@ -68,14 +68,14 @@ struct PlausibilitySettings {
   double max_residual_left = 1.25;  ///< RefinementQuality::residual_left
   double max_missing = 0.15;        ///< RefinementQuality::missing
   double min_confidence = 0.28;     ///< RefinementQuality::confidence
-  double max_surprise = 1.39;       ///< RefinementQuality::surprise
-  double max_flip_gain = 0.162;     ///< RefinementQuality::flip_gain
-  double max_displacement = 0.224;  ///< largest non-rigid displacement, over extent
-  double max_stretch = 2.4;         ///< DisplacementStatistics::stretch
-  double min_compression = 0.0926;  ///< DisplacementStatistics::compression
+  double max_surprise = 1.35;       ///< RefinementQuality::surprise
+  double max_flip_gain = 0.32;      ///< RefinementQuality::flip_gain
+  double max_displacement = 0.227;  ///< largest non-rigid displacement, over extent
+  double max_stretch = 2.34;        ///< DisplacementStatistics::stretch
+  double min_compression = 0.164;   ///< DisplacementStatistics::compression
   double max_folded = 0.05;         ///< DisplacementStatistics::folded_fraction
   double max_turn = 60.0;           ///< of the organ from the start [degree]
-  double max_joint = 0.585;         ///< root mean square of turn, 95th percentile of the residual,
+  double max_joint = 0.587;         ///< root mean square of turn, 95th percentile of the residual,
                                     ///< displacement, missing, confidence and surprise, over limits
   double max_jump_translation = 0.10;  ///< from the last accepted pose, at the organ's centroid [m]
   double max_jump_rotation = 60.0;     ///< from the last accepted pose [degree]

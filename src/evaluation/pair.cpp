@@ -9,6 +9,7 @@
 
 #include "unirit/random.hpp"
 #include "unirit/sampling.hpp"
+#include "unirit/simulation/depth_camera.hpp"
 #include "unirit/simulation/thin_plate_spline.hpp"
 
 namespace unirit {
@@ -20,7 +21,9 @@ constexpr Eigen::Index kSourcePool = 10000;
 constexpr Eigen::Index kInteriorPoints = 200;
 constexpr Eigen::Index kSurfaceSamples = 20000;
 constexpr double kCameraDistance = 4.0;  // half extents from the organ's centre
-constexpr double kOutlierBox = 0.6;      // of the bounding box's sides, from its centre
+constexpr int kImageWidth = 640,
+              kImageHeight = 480;    // shows small organs, seen from their ends, too
+constexpr double kOutlierBox = 0.6;  // of the bounding box's sides, from its centre
 
 /// `count` of the first `available` indices, without replacement, in random sequence.
 std::vector<Eigen::Index> draw(Eigen::Index available, Eigen::Index count, Random& random) {
@@ -64,6 +67,24 @@ void disturb(const View& view, const PointCloud& surface, Points& target, Random
   }
 }
 
+/// What a depth camera at `eye` sees of a mesh about the origin, in the mesh's frame.
+Points depthImage(const Surface& mesh, const Eigen::Vector3d& eye, const View& view,
+                  std::uint64_t seed) {
+  DepthCamera camera;
+  camera.width = kImageWidth;
+  camera.height = kImageHeight;
+  camera.max_range = 2.0 * eye.norm();
+  camera.depth_noise = view.noise;
+  camera.outlier_fraction = view.outlier_share;
+  const Eigen::Isometry3d T_mesh_camera =
+      lookAt(eye, Eigen::Vector3d::Zero(), eye.unitOrthogonal());
+  return moved(T_mesh_camera, renderDepth(mesh, T_mesh_camera.inverse(), camera, seed).points);
+}
+
+bool fromOneSide(const View& view) {
+  return view.target == View::Target::kDepthImage || view.visible_share < 1.0;
+}
+
 /// The first of the surface's points, drawn towards the centroid at the origin.
 Points interiorOf(const Points& surface, Random& random) {
   Points interior = surface.leftCols(std::min(surface.cols(), kInteriorPoints));
@@ -87,9 +108,9 @@ DeformedOrgan::DeformedOrgan(const Surface& organ, std::uint64_t seed, Eigen::In
       randomDeformation(measured, kDeformation * 2.0 * half_extent_, random.next());
   source_pool_ = sampleByArea(centred, std::min(pool, kSourcePool), random.next());
   truth_pool_ = source_pool_.points + spline.displacements(source_pool_.points);
-  Surface deformed = centred;
-  deformed.vertices.points += spline.displacements(vertices);
-  target_pool_ = sampleByArea(deformed, pool, random.next());
+  deformed_ = centred;
+  deformed_.vertices.points += spline.displacements(vertices);
+  target_pool_ = sampleByArea(deformed_, pool, random.next());
   interior_ = interiorOf(measured, random);
   interior_truth_ = interior_ + spline.displacements(interior_);
 }
@@ -115,24 +136,29 @@ DeformedPoints DeformedOrgan::drawPoints(Eigen::Index points, Eigen::Index surfa
           target_pool_.points.leftCols(surface_samples)};
 }
 
-Sight DeformedOrgan::see(const View& view, const Points& truth, Random& random) const {
+Points DeformedOrgan::targetOf(const View& view, const Eigen::Vector3d& eye, const Points& truth,
+                               Random& random) const {
   const Eigen::Index points = truth.cols();
-  const Eigen::Vector3f camera =
-      (kCameraDistance * half_extent_ * random.direction()).cast<float>();
-  Sight sight;
-  if (view.target == View::Target::kPaired) {
-    sight.target = truth;
-  } else if (view.target == View::Target::kPermuted) {
-    sight.target = select(truth, draw(points, points, random));
-  } else if (view.visible_share < 1.0) {
-    const auto visible = facing(target_pool_, camera, view.visible_share);
-    auto seen = draw(static_cast<Eigen::Index>(visible.size()), points, random);
-    for (Eigen::Index& index : seen) index = visible[static_cast<std::size_t>(index)];
-    sight.target = select(target_pool_.points, seen);
-  } else {
-    sight.target = select(target_pool_.points, draw(target_pool_.size(), points, random));
+  if (view.target == View::Target::kPaired) return truth;
+  if (view.target == View::Target::kPermuted) return select(truth, draw(points, points, random));
+  if (view.target == View::Target::kDepthImage) {
+    const Points image = depthImage(deformed_, eye, view, random.next());
+    return select(image, draw(image.cols(), points, random));
   }
-  disturb(view, target_pool_, sight.target, random);
+  if (view.visible_share >= 1.0) {
+    return select(target_pool_.points, draw(target_pool_.size(), points, random));
+  }
+  const auto visible = facing(target_pool_, eye.cast<float>(), view.visible_share);
+  auto seen = draw(static_cast<Eigen::Index>(visible.size()), points, random);
+  for (Eigen::Index& index : seen) index = visible[static_cast<std::size_t>(index)];
+  return select(target_pool_.points, seen);
+}
+
+Sight DeformedOrgan::see(const View& view, const Points& truth, Random& random) const {
+  const Eigen::Vector3d eye = kCameraDistance * half_extent_ * random.direction();
+  Sight sight;
+  sight.target = targetOf(view, eye, truth, random);
+  if (view.target != View::Target::kDepthImage) disturb(view, target_pool_, sight.target, random);
 
   sight.pose = Eigen::Isometry3d::Identity();
   sight.pose.linear() = random.rotation(view.rotation);
@@ -141,9 +167,7 @@ Sight DeformedOrgan::see(const View& view, const Points& truth, Random& random) 
       random.uniformVector(Eigen::Vector3d::Constant(-reach), Eigen::Vector3d::Constant(reach)) +
       view.offset * random.direction();
   sight.target = moved(sight.pose, sight.target);
-  if (view.visible_share < 1.0) {
-    sight.viewpoint = (sight.pose * camera.cast<double>()).cast<float>();
-  }
+  if (fromOneSide(view)) sight.viewpoint = (sight.pose * eye).cast<float>();
   return sight;
 }
 

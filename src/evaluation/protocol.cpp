@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include <array>
 #include <stdexcept>
 
 #include "unirit/evaluation/pair.hpp"
@@ -7,11 +6,22 @@
 namespace unirit {
 namespace {
 
-constexpr std::array<Protocol, 7> kProtocols{
-    Protocol::kPaired,  Protocol::kPermuted, Protocol::kResampled, Protocol::kCaseB,
-    Protocol::kPartial, Protocol::kOffset,   Protocol::kIntraop};
+/// Moved and disturbed as in the operating room.
+void makeIntraoperative(View& view) {
+  view.rotation = 20.0;
+  view.translation = 0.1;
+  view.noise = 0.0015;
+  view.outlier_share = 0.05;
+}
 
 }  // namespace
+
+const std::vector<Protocol>& allProtocols() {
+  static const std::vector<Protocol> protocols{
+      Protocol::kPaired,  Protocol::kPermuted, Protocol::kResampled, Protocol::kCaseB,
+      Protocol::kPartial, Protocol::kOffset,   Protocol::kIntraop,   Protocol::kCamera};
+  return protocols;
+}
 
 const char* toString(Protocol protocol) {
   switch (protocol) {
@@ -29,12 +39,14 @@ const char* toString(Protocol protocol) {
       return "offset";
     case Protocol::kIntraop:
       return "intraop";
+    case Protocol::kCamera:
+      return "camera";
   }
   return "unknown";
 }
 
 Protocol protocolFromString(const std::string& name) {
-  for (const Protocol protocol : kProtocols) {
+  for (const Protocol protocol : allProtocols()) {
     if (name == toString(protocol)) return protocol;
   }
   throw std::invalid_argument("protocol: unknown protocol '" + name + "'");
@@ -63,10 +75,11 @@ View viewOf(Protocol protocol) {
       break;
     case Protocol::kIntraop:
       view.visible_share = 0.35;
-      view.rotation = 20.0;
-      view.translation = 0.1;
-      view.noise = 0.0015;
-      view.outlier_share = 0.05;
+      makeIntraoperative(view);
+      break;
+    case Protocol::kCamera:
+      view.target = View::Target::kDepthImage;
+      makeIntraoperative(view);
       break;
   }
   return view;

@@ -17,15 +17,7 @@ constexpr double kRightGrowth = 1.1;  // over the error before
 constexpr double kNoise = 0.0015;     // of a table top [m]
 constexpr double kSmallShare = 0.1;
 
-constexpr std::array<Protocol, 4> kOrdinaryProtocols{Protocol::kResampled, Protocol::kCaseB,
-                                                     Protocol::kPartial, Protocol::kIntraop};
-constexpr std::array<Protocol, 2> kViewProtocols{Protocol::kPartial, Protocol::kIntraop};
 constexpr std::array<float, 4> kUnits{1000.0F, 0.001F, 100.0F, 0.01F};
-
-template <std::size_t N>
-Protocol inTurn(const std::array<Protocol, N>& protocols, int number) {
-  return protocols[static_cast<std::size_t>(number) % N];
-}
 
 Trial trialOf(TrialKind kind, Protocol protocol, RegistrationPair pair) {
   return {kind,
@@ -108,7 +100,20 @@ PointCloud tableTop(double organ_extent, bool objects, Eigen::Index points, Rand
   return {moved(pose, seen), Points(), moved(pose, above)};
 }
 
+/// Those whose share in view can be chosen.
+const std::vector<Protocol>& smallProtocols() {
+  static const std::vector<Protocol> protocols{Protocol::kPartial, Protocol::kIntraop};
+  return protocols;
+}
+
 }  // namespace
+
+const std::vector<Protocol>& ordinaryProtocols() {
+  static const std::vector<Protocol> protocols{Protocol::kResampled, Protocol::kCaseB,
+                                               Protocol::kPartial, Protocol::kIntraop,
+                                               Protocol::kCamera};
+  return protocols;
+}
 
 const std::vector<TrialKind>& trialKinds() {
   static const std::vector<TrialKind> kinds{
@@ -152,8 +157,8 @@ bool Trial::isRight(const Points& moved) const {
 Trial makeTrial(TrialKind kind, int number, const DeformedOrgan& own, const DeformedOrgan& other,
                 Eigen::Index points, std::uint64_t seed) {
   const bool small = kind == TrialKind::kSmallView;
-  const Protocol protocol =
-      small ? inTurn(kViewProtocols, number) : inTurn(kOrdinaryProtocols, number);
+  const auto& protocols = small ? smallProtocols() : ordinaryProtocols();
+  const Protocol protocol = protocols[static_cast<std::size_t>(number) % protocols.size()];
   View view = viewOf(protocol);
   if (small) view.visible_share = kSmallShare;
   Trial trial = trialOf(kind, protocol, own.pair(view, points, seed));

@@ -45,12 +45,13 @@ constexpr std::array<BcpdRow, 5> kBcpd{{{1.5, 5.0, 0.3, 1.0, true, false},
                                         {0.7, 2000.0, 0.1, 0.1, true, false}}};
 
 /// The protocol's row. `paired` is `permuted` in another sequence, which no rival sees; `offset` is
-/// `caseb` with centroids that must be brought together.
+/// `caseb` with centroids that must be brought together; `camera` is disturbed as `intraop` is.
 template <class Row>
 Row rowOf(const std::array<Row, 5>& table, Protocol protocol) {
   Protocol tuned = protocol;
   if (protocol == Protocol::kPaired) tuned = Protocol::kPermuted;
   if (protocol == Protocol::kOffset) tuned = Protocol::kCaseB;
+  if (protocol == Protocol::kCamera) tuned = Protocol::kIntraop;
   std::size_t place = 0;
   while (kTuned[place] != tuned) ++place;
   Row row = table[place];

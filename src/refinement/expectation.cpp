@@ -23,7 +23,10 @@ Attraction attractionOf(Correspondence correspondence, bool whole) {
 
 Expectation::Expectation(const PointCloud& source, Correspondence correspondence,
                          const Kernels& kernels, ThreadTeam& team)
-    : source_(source), correspondence_(correspondence), estimator_(kernels, team) {}
+    : source_(source),
+      correspondence_(correspondence),
+      visibility_(source.points),
+      estimator_(kernels, team) {}
 
 void Expectation::look(const Sighting& sighting) {
   attraction_ = attractionOf(correspondence_, sighting.whole);
@@ -37,8 +40,8 @@ const Correspondences& Expectation::at(const CoherentState& state, float sigma) 
   moved_.points = state.pose.translation().replicate(1, source_.size());
   moved_.points.noalias() += state.pose.linear() * bent_;
   moved_.normals.noalias() = state.pose.linear() * source_.normals;
-  updateVisibility(moved_, eye_, visibility_);
-  estimator_.estimate(moved_, visibility_, attraction_, correspondences_);
+  visibility_.update(moved_, eye_, visible_);
+  estimator_.estimate(moved_, visible_, attraction_, correspondences_);
   turnNormals();
   return correspondences_;
 }

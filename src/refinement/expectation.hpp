@@ -7,6 +7,7 @@
 #include "correspondence.hpp"
 #include "sighting.hpp"
 #include "unirit/settings.hpp"
+#include "visibility.hpp"
 
 namespace unirit {
 
@@ -25,17 +26,20 @@ class Expectation {
   /// After look. `sigma`: standard deviation of the distance, the clouds' unit.
   const Correspondences& at(const CoherentState& state, float sigma);
 
+  const Visibility& visibility() const { return visibility_; }
+
  private:
   void turnNormals();
 
   const PointCloud& source_;
   Correspondence correspondence_;
+  Visibility visibility_;
   CorrespondenceEstimator estimator_;
   Attraction attraction_;
   std::optional<Eigen::Vector3f> eye_;
   Points bent_;
   PointCloud moved_;
-  Eigen::RowVectorXf visibility_;
+  Eigen::RowVectorXf visible_;
   Correspondences correspondences_;
 };
 

@@ -26,8 +26,8 @@ constexpr float kWidestSigma = 0.4F;         // where the pose alone is sought
 constexpr float kFirstSigma = 0.12F;         // where pose and displacement are sought
 constexpr float kNarrowSigma = 0.06F;        // where either ends that has few points
 constexpr float kNearSigma = 0.04F;          // where the search begins near its end
-constexpr float kFlipSigma = 0.2F;           // where a flipped organ begins
-constexpr int kFlipIterations = 8;
+constexpr float kTrialSigma = 0.2F;          // where the search begins for a pose that is tried out
+constexpr int kTrialIterations = 8;
 constexpr float kStride = 1.8F;           // of all iterations of both but the last: over-relaxation
 constexpr float kWholeSharpness = 0.75F;  // last sigma of a whole surface over that of a view
 constexpr float kSurfaceAcross = 0.3F;    // deviation along the surface, which geometry hardly sees
@@ -187,26 +187,38 @@ void Refinement::refine(const Sighting& sighting, const SearchStart& start, Refi
   refined.fit = expectation_.at(state_, static_cast<float>(settings_.last_sigma)).fit;
 }
 
+/// The best fit about a pose, without a displacement.
+double Refinement::fitNear(const Eigen::Isometry3f& pose, const Sighting& few) {
+  coarse_expectation_.look(moved(pose.inverse(), few));
+  coarse_solver_.restart(priorOf(few));
+  coarse_state_.pose.setIdentity();
+  coarse_state_.displacements.setZero(3, coarse_.size());
+  seekPose(kTrialSigma, kTrialIterations);
+  return coarse_expectation_.at(coarse_state_, kNarrowSigma).fit;
+}
+
+/// A cloud that does not face its viewpoint is a hollow seen from within, or the viewpoint is
+/// wrong.
+Sighting Refinement::sight(const PointCloud& target) {
+  const Sighting sighting = sightingOf(target, area_);
+  if (sighting.whole || !target.viewpoint || *sighting.eye == *target.viewpoint) return sighting;
+  const Sighting hollow = seenFrom(*target.viewpoint, sighting);
+  const auto start = Eigen::Isometry3f::Identity();
+  return fitNear(start, pickFew(hollow)) > fitNear(start, pickFew(sighting)) ? hollow : sighting;
+}
+
 double Refinement::flipGain(const Sighting& sighting, const Eigen::Isometry3f& pose) {
   const Sighting few = pickFew(sighting);
-  const auto fitAbout = [&](const Eigen::Isometry3f& start) {
-    coarse_expectation_.look(moved(start.inverse(), few));
-    coarse_solver_.restart(priorOf(few));
-    coarse_state_.pose.setIdentity();
-    coarse_state_.displacements.setZero(3, coarse_.size());
-    seekPose(kFlipSigma, kFlipIterations);
-    return coarse_expectation_.at(coarse_state_, kNarrowSigma).fit;
-  };
   double best = -std::numeric_limits<double>::infinity();
-  for (const Eigen::Isometry3f& flip : flips_) best = std::max(best, fitAbout(pose * flip));
-  return best - fitAbout(pose);
+  for (const Eigen::Isometry3f& flip : flips_) best = std::max(best, fitNear(pose * flip, few));
+  return best - fitNear(pose, few);
 }
 
 Agreement Refinement::agreement(const Sighting& sighting, const Refined& refined) const {
   const Points& target = sighting.seen.points;
   const Points bent = source_.points + prior_->displacements(source_.points, refined.coefficients);
   const PointCloud moved{refined.pose * bent, refined.pose.linear() * source_.normals};
-  const Eigen::RowVectorXf visible = visibility(moved, sighting.eye);
+  const Eigen::RowVectorXf visible = expectation_.visibility().of(moved, sighting.eye);
   const float sparseness = kNearbyPoints / static_cast<float>(target.cols());
   const float reach = kNearby * std::sqrt(std::max(sparseness, 1.0F));
   const Eigen::RowVectorXf lonely =

@@ -50,7 +50,7 @@ class Refinement {
 
   /// `target`: 3 x M samples of what is seen, normals are estimated; its viewpoint in the same
   /// frame, if known.
-  Sighting sight(const PointCloud& target) const { return sightingOf(target, area_); }
+  Sighting sight(const PointCloud& target);
 
   /// What is seen lies about where the source does.
   Refined refine(const Sighting& sighting, const SearchStart& start);
@@ -80,6 +80,7 @@ class Refinement {
   void searchCoarsely(const Sighting& sighting, const PosePrior& prior, const SearchStart& start,
                       int iterations);
   void seekPose(float first_sigma, int iterations);
+  double fitNear(const Eigen::Isometry3f& pose, const Sighting& few);
   Trust trust(float sigma) const;
 
   PointCloud source_;

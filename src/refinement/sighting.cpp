@@ -19,9 +19,7 @@ constexpr Eigen::Index kDiscs = 256;     // enough for the median
 constexpr double kOpennessOverShare = 3.5;
 constexpr double kLeastShare = 0.75;
 constexpr double kWholeOpennessFromViewpoint = 0.25;  // a viewpoint speaks for one side
-constexpr float kFar = 8.0F;            // a viewpoint that is not known lies so far away
-constexpr float kGrazingCosine = 0.2F;  // surely seen from kGrazingCosine + kGrazingRange on
-constexpr float kGrazingRange = 0.3F;
+constexpr float kFar = 8.0F;  // a viewpoint that is not known lies so far away
 
 /// Whether the outward normals look to the viewpoint on the whole; from a wrong one, such as that
 /// of another frame, they mostly look away.
@@ -49,17 +47,22 @@ double sampledArea(const Points& points) {
 Sighting sightingOf(const PointCloud& target, double organ_area) {
   Sighting sighting;
   sighting.seen = {target.points, outwardNormals(target.points)};
-  PointCloud& seen = sighting.seen;
+  const PointCloud& seen = sighting.seen;
   const bool known = target.viewpoint && faces(seen, *target.viewpoint);
   const double share = sampledArea(seen.points) / organ_area;
   const double most = kOpennessOverShare * (share - kLeastShare);
   sighting.whole =
       openness(seen.normals) < (known ? std::min(most, kWholeOpennessFromViewpoint) : most);
   if (sighting.whole) return sighting;
-  sighting.eye = known ? *target.viewpoint
-                       : Eigen::Vector3f(centroid(seen.points) +
-                                         kFar * seen.normals.rowwise().mean().normalized());
-  orientTowards(seen.points, *sighting.eye, seen.normals);
+  return seenFrom(known ? *target.viewpoint
+                        : Eigen::Vector3f(centroid(seen.points) +
+                                          kFar * seen.normals.rowwise().mean().normalized()),
+                  sighting);
+}
+
+Sighting seenFrom(const Eigen::Vector3f& eye, const Sighting& part) {
+  Sighting sighting{part.seen, false, eye};
+  orientTowards(sighting.seen.points, eye, sighting.seen.normals);
   return sighting;
 }
 
@@ -69,24 +72,6 @@ Sighting moved(const Eigen::Isometry3f& transform, const Sighting& sighting) {
                  sighting.eye};
   if (moved.eye) moved.eye = transform * *moved.eye;
   return moved;
-}
-
-Eigen::RowVectorXf visibility(const PointCloud& oriented,
-                              const std::optional<Eigen::Vector3f>& eye) {
-  Eigen::RowVectorXf visibility;
-  updateVisibility(oriented, eye, visibility);
-  return visibility;
-}
-
-void updateVisibility(const PointCloud& oriented, const std::optional<Eigen::Vector3f>& eye,
-                      Eigen::RowVectorXf& visibility) {
-  visibility.setOnes(oriented.size());
-  if (!eye) return;
-  for (Eigen::Index i = 0; i < oriented.size(); ++i) {
-    const Eigen::Vector3f ray = (*eye - oriented.points.col(i)).normalized();
-    const float cosine = oriented.normals.col(i).dot(ray);
-    visibility[i] = std::clamp((cosine - kGrazingCosine) / kGrazingRange, 0.0F, 1.0F);
-  }
 }
 
 }  // namespace unirit

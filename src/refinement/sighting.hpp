@@ -15,6 +15,9 @@ struct Sighting {
   std::optional<Eigen::Vector3f> eye;  ///< from where a part is seen
 };
 
+/// A part seen from elsewhere.
+Sighting seenFrom(const Eigen::Vector3f& eye, const Sighting& part);
+
 /// The same seen in another frame.
 Sighting moved(const Eigen::Isometry3f& transform, const Sighting& sighting);
 
@@ -26,14 +29,5 @@ double sampledArea(const Points& points);
 /// mean of its normals. A part is seen from the target's viewpoint or, where that is not known or
 /// the cloud does not face it, from where its normals point.
 Sighting sightingOf(const PointCloud& target, double organ_area);
-
-/// How sure it is that the eye sees each oriented point, a row in [0, 1]: whether it faces it. Ones
-/// where there is no eye.
-Eigen::RowVectorXf visibility(const PointCloud& oriented,
-                              const std::optional<Eigen::Vector3f>& eye);
-
-/// The same, written over what was known of as many points; allocates nothing then.
-void updateVisibility(const PointCloud& oriented, const std::optional<Eigen::Vector3f>& eye,
-                      Eigen::RowVectorXf& visibility);
 
 }  // namespace unirit

@@ -25,8 +25,8 @@ void addDataOptions(CLI::App& app, BenchmarkOptions& options) {
       ->delimiter(',')
       ->capture_default_str();
   app.add_option("--protocols", options.protocols,
-                 "paired, permuted, resampled, caseb, partial, offset, intraop; partial:30 shows "
-                 "30 % of the surface, intraop:30 too (not with --cases)")
+                 "paired, permuted, resampled, caseb, partial, offset, intraop, camera; partial:30 "
+                 "shows 30 % of the surface, intraop:30 too (not with --cases)")
       ->delimiter(',')
       ->capture_default_str();
   app.add_option("--pairs", options.pairs, "Pairs of each organ")
@@ -43,10 +43,11 @@ void addDataOptions(CLI::App& app, BenchmarkOptions& options) {
 }
 
 void addMethodOptions(CLI::App& app, BenchmarkOptions& options) {
-  app.add_option("--methods", options.methods,
-                 "[LABEL@]NAME[:KEY=VALUE]...; names: identity, best-rigid, icp, gicp, cpd-rigid, "
-                 "cpd, bcpd, unirit, unirit-rows; unirit's keys: weights=FILE, stages=rigid+nonrigid, "
-                 "start=centroids; a rival's keys replace its tuned settings")
+  app.add_option(
+         "--methods", options.methods,
+         "[LABEL@]NAME[:KEY=VALUE]...; names: identity, best-rigid, icp, gicp, cpd-rigid, "
+         "cpd, bcpd, unirit, unirit-rows; unirit's keys: weights=FILE, stages=rigid+nonrigid, "
+         "start=centroids; a rival's keys replace its tuned settings")
       ->delimiter(',')
       ->capture_default_str();
   app.add_option("--weights", options.weights, "Weights file of unirit");

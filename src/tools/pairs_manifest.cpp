@@ -13,7 +13,7 @@ Json protocolsJson(const std::vector<Protocol>& protocols) {
   Json json;
   for (const Protocol protocol : protocols) {
     const View view = viewOf(protocol);
-    constexpr const char* kTargets[] = {"paired", "permuted", "resampled"};
+    constexpr const char* kTargets[] = {"paired", "permuted", "resampled", "depth image"};
     json[toString(protocol)] = {{"target", kTargets[static_cast<int>(view.target)]},
                                 {"visible_share", view.visible_share},
                                 {"rotation_degrees", view.rotation},

@@ -78,7 +78,7 @@ ParsedPairsOptions parsePairsOptions(int argc, char** argv) {
       ->required();
   app.add_option("--exclude", options.exclude, "organ classes left out, such as small_bowel");
   app.add_option("--protocols", protocols,
-                 "paired, permuted, resampled, caseb, partial, offset, intraop; or all")
+                 "paired, permuted, resampled, caseb, partial, offset, intraop, camera; or all")
       ->delimiter(',')
       ->capture_default_str();
   app.add_option("--points", settings.points, "of each cloud")
@@ -117,10 +117,11 @@ ParsedPairsOptions parsePairsOptions(int argc, char** argv) {
   try {
     app.parse(argc, argv);
     if (protocols == std::vector<std::string>{"all"}) {
-      protocols = {"paired", "permuted", "resampled", "caseb", "partial", "offset", "intraop"};
-    }
-    for (const std::string& name : protocols) {
-      settings.protocols.push_back(protocolFromString(name));
+      settings.protocols = allProtocols();
+    } else {
+      for (const std::string& name : protocols) {
+        settings.protocols.push_back(protocolFromString(name));
+      }
     }
     for (const std::string& text : lengths) addLengthRange(text, settings.limits);
     if (std::filesystem::path(options.output).extension() == ".json") {

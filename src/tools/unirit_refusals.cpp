@@ -23,7 +23,6 @@
 namespace unirit {
 namespace {
 
-constexpr int kOrdinaryTrials = 4;  // of each organ and round: one of each protocol
 constexpr double kMillimetres = 1000.0;
 
 /// "kidney" of kidney_tumor: with and without a tumour it is no other organ.
@@ -115,13 +114,14 @@ class Round {
     const auto number = static_cast<int>(first_ + organ);
     for (const TrialKind kind : trialKinds()) {
       const bool ordinary = kind == TrialKind::kOrdinary;
-      for (int k = 0; k < (ordinary ? kOrdinaryTrials : 1); ++k) {
+      const std::size_t trials = ordinary ? ordinaryProtocols().size() : 1;
+      for (std::size_t k = 0; k < trials; ++k) {
         Row row;
         row.organ = organ;
         row.other = otherThan(organ, random);
         row.seed = random.next();
-        row.trial = makeTrial(kind, ordinary ? k : number, *deformed_[organ], *deformed_[row.other],
-                              options_.points, row.seed);
+        row.trial = makeTrial(kind, ordinary ? static_cast<int>(k) : number, *deformed_[organ],
+                              *deformed_[row.other], options_.points, row.seed);
         row.registration = registrar.registerClouds(row.trial.preoperative,
                                                     row.trial.intraoperative, row.trial.guess);
         rows_[organ].push_back(std::move(row));

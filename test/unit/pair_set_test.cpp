@@ -19,7 +19,7 @@ namespace fs = std::filesystem;
 
 constexpr Eigen::Index kPoints = 128, kSurface = 300;
 const std::vector<Protocol> kProtocols{Protocol::kPaired, Protocol::kCaseB, Protocol::kPartial,
-                                       Protocol::kOffset, Protocol::kIntraop};
+                                       Protocol::kOffset, Protocol::kCamera};
 
 std::string contents(const fs::path& path) {
   std::ostringstream text;

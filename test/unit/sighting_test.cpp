@@ -77,14 +77,5 @@ TEST(Sighting, OfAPartIsFromItsNormalsWhereTheViewpointIsUnknownOrWrong) {
   }
 }
 
-TEST(Visibility, IsOneBeforeTheEyeAndZeroBehind) {
-  const PointCloud two{(Points(3, 2) << 0, 0, 0, 0, 1, -1).finished(),
-                       (Points(3, 2) << 0, 0, 0, 0, 1, -1).finished()};
-  const Eigen::RowVectorXf seen = visibility(two, Eigen::Vector3f(0, 0, 5));
-  EXPECT_EQ(seen[0], 1.0F);
-  EXPECT_EQ(seen[1], 0.0F);
-  EXPECT_EQ(visibility(two, std::nullopt), Eigen::RowVectorXf::Ones(2));
-}
-
 }  // namespace
 }  // namespace unirit

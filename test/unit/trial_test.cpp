@@ -57,7 +57,8 @@ TEST(Trial, OrdinaryOnesTakeTurnsWithTheProtocols) {
   EXPECT_EQ(trial(TrialKind::kOrdinary, 0).protocol, Protocol::kResampled);
   EXPECT_EQ(trial(TrialKind::kOrdinary, 1).protocol, Protocol::kCaseB);
   EXPECT_EQ(trial(TrialKind::kOrdinary, 2).protocol, Protocol::kPartial);
-  EXPECT_EQ(trial(TrialKind::kOrdinary, 7).protocol, Protocol::kIntraop);
+  EXPECT_EQ(trial(TrialKind::kOrdinary, 3).protocol, Protocol::kIntraop);
+  EXPECT_EQ(trial(TrialKind::kOrdinary, 9).protocol, Protocol::kCamera);
   EXPECT_GT(shareNear(trial(TrialKind::kOrdinary, 0)), 0.9);
 }
 

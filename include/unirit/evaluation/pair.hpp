@@ -13,7 +13,19 @@
 namespace unirit {
 
 /// How a target is made from a deformed organ; docs/benchmark.md describes each.
-enum class Protocol { kPaired, kPermuted, kResampled, kCaseB, kPartial, kOffset, kIntraop };
+enum class Protocol {
+  kPaired,
+  kPermuted,
+  kResampled,
+  kCaseB,
+  kPartial,
+  kOffset,
+  kIntraop,
+  kCamera
+};
+
+/// In the sequence of their declaration.
+const std::vector<Protocol>& allProtocols();
 
 const char* toString(Protocol protocol);
 
@@ -22,14 +34,15 @@ Protocol protocolFromString(const std::string& name);
 
 /// What is seen of a deformed organ, and from where.
 struct View {
-  enum class Target { kPaired, kPermuted, kResampled };
-  Target target = Target::kResampled;  ///< the source's own points (in order or not), or fresh ones
-  double visible_share = 1.0;          ///< of the surface, the part that faces the camera most
-  double rotation = 0.0;               ///< about a random axis, at most [degree]
-  double translation = 0.0;            ///< per axis, at most, over the half extent
-  double offset = 0.0;                 ///< further translation in a random direction [m]
-  double noise = 0.0;                  ///< standard deviation per axis [m]
-  double outlier_share = 0.0;          ///< of the target's points, scattered around the organ
+  /// The source's own points (in order or not), fresh ones, or those of a depth image.
+  enum class Target { kPaired, kPermuted, kResampled, kDepthImage };
+  Target target = Target::kResampled;
+  double visible_share = 1.0;  ///< of fresh ones, the part that faces the camera most
+  double rotation = 0.0;       ///< about a random axis, at most [degree]
+  double translation = 0.0;    ///< per axis, at most, over the half extent
+  double offset = 0.0;         ///< further translation in a random direction [m]
+  double noise = 0.0;          ///< standard deviation per axis, in a depth image along the ray [m]
+  double outlier_share = 0.0;  ///< of the points, scattered around the organ, or along their rays
 };
 
 View viewOf(Protocol protocol);
@@ -86,8 +99,12 @@ class DeformedOrgan {
   Sight see(const View& view, const Points& truth, Random& random) const;
 
  private:
+  Points targetOf(const View& view, const Eigen::Vector3d& eye, const Points& truth,
+                  Random& random) const;
+
   PointCloud source_pool_;
   Points truth_pool_;
+  Surface deformed_;
   PointCloud target_pool_;
   Points interior_;
   Points interior_truth_;

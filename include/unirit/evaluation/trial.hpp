@@ -21,6 +21,9 @@ enum class TrialKind {
   kHalfOther,   ///< one half of the cloud is another organ's
 };
 
+/// Those that ordinary trials take turns with.
+const std::vector<Protocol>& ordinaryProtocols();
+
 const std::vector<TrialKind>& trialKinds();
 const char* toString(TrialKind kind);
 

@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: BSD-3-Clause
+#include "visibility.hpp"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+
+#include "unirit/sampling.hpp"
+
+namespace unirit {
+namespace {
+
+constexpr float kGrazingCosine = 0.1F;  // surely facing from kGrazingCosine + kGrazingRange on
+constexpr float kGrazingRange = 0.3F;
+constexpr int kHiders = 256;
+constexpr float kHiderRadius = 0.2F;   // of what a hider stands for: hiders lie about so far apart
+constexpr float kHidingHeight = 0.1F;  // surely hidden by what stands so high above
+
+/// x, y, z and how surely it faces the eye: what does not is the back of something that hides, too.
+using Hiders = Eigen::Array<float, Eigen::Dynamic, 4, Eigen::ColMajor, kHiders, 4>;
+
+Eigen::Vector3f rayTo(const Eigen::Vector3f& eye, const Eigen::Vector3f& point) {
+  return (eye - point).normalized();
+}
+
+/// How surely some hider stands between an oriented point and the eye that `ray` leads to: near the
+/// ray, and above the tangent plane, for what is nearer on the same slope is in nobody's way.
+float hidden(const Hiders& hiders, const Eigen::Vector3f& point, const Eigen::Vector3f& normal,
+             const Eigen::Vector3f& ray) {
+  if (hiders.rows() == 0) return 0.0F;
+  const auto x = hiders.col(0) - point.x(), y = hiders.col(1) - point.y(),
+             z = hiders.col(2) - point.z();
+  const auto height = x * normal.x() + y * normal.y() + z * normal.z();
+  const auto along = x * ray.x() + y * ray.y() + z * ray.z();
+  const auto squared_away = x.square() + y.square() + z.square() - along.square();
+  const auto near = 2.0F - squared_away * (2.0F / (kHiderRadius * kHiderRadius));
+  return (hiders.col(3) * near.max(0.0F).min(1.0F) *
+          (height * (1.0F / kHidingHeight)).max(0.0F).min(1.0F))
+      .maxCoeff();
+}
+
+}  // namespace
+
+Visibility::Visibility(const Points& surface) : hiders_(sampleEvenly(surface, kHiders)) {}
+
+Eigen::RowVectorXf Visibility::of(const PointCloud& moved,
+                                  const std::optional<Eigen::Vector3f>& eye) const {
+  Eigen::RowVectorXf visibility;
+  update(moved, eye, visibility);
+  return visibility;
+}
+
+void Visibility::update(const PointCloud& moved, const std::optional<Eigen::Vector3f>& eye,
+                        Eigen::RowVectorXf& visibility) const {
+  visibility.setOnes(moved.size());
+  if (!eye) return;
+  for (Eigen::Index i = 0; i < moved.size(); ++i) {
+    const float cosine = moved.normals.col(i).dot(rayTo(*eye, moved.points.col(i)));
+    visibility[i] = std::clamp((cosine - kGrazingCosine) / kGrazingRange, 0.0F, 1.0F);
+  }
+  Hiders hiders(kHiders, 4);
+  Eigen::Index count = 0;
+  for (const Eigen::Index i : hiders_) {
+    if (visibility[i] == 0.0F) continue;
+    hiders.row(count++) << moved.points.col(i).transpose().array(), visibility[i];
+  }
+  hiders.conservativeResize(count, 4);
+  for (Eigen::Index i = 0; i < moved.size(); ++i) {
+    if (visibility[i] == 0.0F) continue;
+    const Eigen::Vector3f point = moved.points.col(i);
+    visibility[i] *= 1.0F - hidden(hiders, point, moved.normals.col(i), rayTo(*eye, point));
+  }
+}
+
+}  // namespace unirit
