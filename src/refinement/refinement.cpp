@@ -198,11 +198,12 @@ double Refinement::fitNear(const Eigen::Isometry3f& pose, const Sighting& few) {
 }
 
 /// A cloud that does not face its viewpoint is a hollow seen from within, or the viewpoint is
-/// wrong.
+/// wrong; without one it may have been seen from either side.
 Sighting Refinement::sight(const PointCloud& target) {
   const Sighting sighting = sightingOf(target, area_);
-  if (sighting.whole || !target.viewpoint || *sighting.eye == *target.viewpoint) return sighting;
-  const Sighting hollow = seenFrom(*target.viewpoint, sighting);
+  if (sighting.whole || sighting.eye == target.viewpoint) return sighting;
+  const Eigen::Vector3f opposite = 2.0F * centroid(target.points) - *sighting.eye;
+  const Sighting hollow = seenFrom(target.viewpoint.value_or(opposite), sighting);
   const auto start = Eigen::Isometry3f::Identity();
   return fitNear(start, pickFew(hollow)) > fitNear(start, pickFew(sighting)) ? hollow : sighting;
 }

@@ -48,8 +48,8 @@ class Refinement {
   Refinement(const Refinement&) = delete;
   Refinement& operator=(const Refinement&) = delete;
 
-  /// `target`: 3 x M samples of what is seen, normals are estimated; its viewpoint in the same
-  /// frame, if known.
+  /// `target`: 3 x M samples of what is seen, about where the source lies; normals are estimated;
+  /// its viewpoint in the same frame, if known.
   Sighting sight(const PointCloud& target);
 
   /// What is seen lies about where the source does.

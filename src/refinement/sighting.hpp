@@ -27,7 +27,7 @@ double sampledArea(const Points& points);
 
 /// Tells a whole surface from a part by its area, over `organ_area` (of sampledArea), and by the
 /// mean of its normals. A part is seen from the target's viewpoint or, where that is not known or
-/// the cloud does not face it, from where its normals point.
+/// the cloud does not face it, from where its outward normals point: a hollow from its back.
 Sighting sightingOf(const PointCloud& target, double organ_area);
 
 }  // namespace unirit

@@ -113,10 +113,12 @@ TEST(Refinement, BelievesTheViewpointOfAHollowSeenFromWithinButNoWrongOne) {
   Refinement refinement(bowl, {}, selectKernels(), team);
 
   const Eigen::Vector3f above(0.2F, 0.1F, 4.0F);
-  const Sighting hollow = refinement.sight({halfSphere(0.7F, false, 400, 3).points, {}, above});
+  const Points within = halfSphere(0.7F, false, 400, 3).points;
+  const Sighting hollow = refinement.sight({within, {}, above});
   ASSERT_FALSE(hollow.whole);
   EXPECT_EQ(*hollow.eye, above);
   EXPECT_LT(hollow.seen.normals.cwiseProduct(hollow.seen.points).colwise().sum().mean(), -0.6F);
+  EXPECT_GT(refinement.sight({within, {}}).eye->z(), 1.0F);
 
   const Sighting back = refinement.sight({halfSphere(1.0F, true, 600, 4).points, {}, above});
   ASSERT_FALSE(back.whole);
