@@ -10,6 +10,7 @@
 #include <sstream>
 #include <vector>
 
+#include "unirit/evaluation/trial.hpp"
 #include "unirit/network/weights.hpp"
 
 namespace unirit {
@@ -94,7 +95,8 @@ TEST_F(RefusalsTool, WritesARowForEveryTrialWithTheValueOfEveryCheck) {
     }
   }
   ASSERT_EQ(kinds.size(), 7U);
-  EXPECT_EQ(kinds["ordinary"], 4 * kinds["table top"]);
+  const auto protocols = static_cast<int>(ordinaryProtocols().size());
+  EXPECT_EQ(kinds["ordinary"], protocols * kinds["table top"]);
   for (const char* kind : {"other organ", "wrong unit", "far start", "small view", "half other"}) {
     EXPECT_EQ(kinds[kind], kinds["table top"]) << kind;
   }
