@@ -21,8 +21,8 @@ constexpr Eigen::Index kSourcePool = 10000;
 constexpr Eigen::Index kInteriorPoints = 200;
 constexpr Eigen::Index kSurfaceSamples = 20000;
 constexpr double kCameraDistance = 4.0;  // half extents from the organ's centre
-constexpr int kImageWidth = 640,
-              kImageHeight = 480;    // shows small organs, seen from their ends, too
+constexpr int kImageWidth = 640;         // large enough for slender organs that are seen end-on
+constexpr int kImageHeight = 480;
 constexpr double kOutlierBox = 0.6;  // of the bounding box's sides, from its centre
 
 /// `count` of the first `available` indices, without replacement, in random sequence.

@@ -203,9 +203,11 @@ Sighting Refinement::sight(const PointCloud& target) {
   const Sighting sighting = sightingOf(target, area_);
   if (sighting.whole || sighting.eye == target.viewpoint) return sighting;
   const Eigen::Vector3f opposite = 2.0F * centroid(target.points) - *sighting.eye;
-  const Sighting hollow = seenFrom(target.viewpoint.value_or(opposite), sighting);
+  const Eigen::Vector3f other = target.viewpoint.value_or(opposite);
   const auto start = Eigen::Isometry3f::Identity();
-  return fitNear(start, pickFew(hollow)) > fitNear(start, pickFew(sighting)) ? hollow : sighting;
+  const Sighting few = pickFew(sighting);
+  const bool hollow = fitNear(start, seenFrom(other, few)) > fitNear(start, few);
+  return hollow ? seenFrom(other, sighting) : sighting;
 }
 
 double Refinement::flipGain(const Sighting& sighting, const Eigen::Isometry3f& pose) {

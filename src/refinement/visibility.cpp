@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "visibility.hpp"
 
-#include <Eigen/Geometry>
 #include <algorithm>
 
 #include "unirit/sampling.hpp"
@@ -12,10 +11,11 @@ namespace {
 constexpr float kGrazingCosine = 0.1F;  // surely facing from kGrazingCosine + kGrazingRange on
 constexpr float kGrazingRange = 0.3F;
 constexpr int kHiders = 256;
-constexpr float kHiderRadius = 0.2F;   // of what a hider stands for: hiders lie about so far apart
+constexpr float kHiderRadius = 0.2F;   // a hider reaches so far across a ray, as hiders lie apart
 constexpr float kHidingHeight = 0.1F;  // surely hidden by what stands so high above
 
-/// x, y, z and how surely it faces the eye: what does not is the back of something that hides, too.
+/// x, y, z and how surely it faces the eye. What faces away need not count: a front before it hides
+/// as much.
 using Hiders = Eigen::Array<float, Eigen::Dynamic, 4, Eigen::ColMajor, kHiders, 4>;
 
 Eigen::Vector3f rayTo(const Eigen::Vector3f& eye, const Eigen::Vector3f& point) {
