@@ -2,6 +2,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 
 #include "lenient_limits.hpp"
 #include "unirit/evaluation/pair.hpp"
@@ -112,6 +114,16 @@ TEST(RegistrationStages, RefinementMovesAlongWithBothClouds) {
     const double difference =
         rootMeanSquareDistance(refined(far).deformation->movedSurface(), motion * near_result);
     EXPECT_LT(difference, 1e-5) << toString(protocol);
+  }
+}
+
+TEST(RegistrationStages, RefinementTakesAViewpointThatIsNotFiniteForNone) {
+  RegistrationPair pair = pairOf("liver", Protocol::kCamera);
+  pair.viewpoint.reset();
+  const Points without = refined(pair).deformation->movedSurface();
+  for (const float odd : {std::nanf(""), std::numeric_limits<float>::infinity()}) {
+    pair.viewpoint = Eigen::Vector3f(0.0F, odd, 1.0F);
+    EXPECT_EQ(refined(pair).deformation->movedSurface(), without) << odd;
   }
 }
 
