@@ -26,7 +26,7 @@ struct RefinementQuality {
   double fit = 0.0;       ///< mean log likelihood of seen and of visible points, up to constants
   double surprise = 0.0;  ///< of the displacement under its prior: its length over the length that
                           ///< is expected of what the cloud could show of it, in deviations
-  double missing = 0.0;   ///< share of the organ's side that faces the viewpoint (all of it where
+  double missing = 0.0;   ///< share of what the viewpoint should see of the organ (all of it where
                           ///< the whole was seen) without a cloud point within 0.05 of the extent
   double confidence = 0.0;     ///< DisplacementField::confidence, mean over the organ
   double residual_left = 1.0;  ///< RMS distance of the cloud to the moved organ over that to the

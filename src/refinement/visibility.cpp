@@ -18,22 +18,22 @@ constexpr float kHidingHeight = 0.1F;  // surely hidden by what stands so high a
 /// as much.
 using Hiders = Eigen::Array<float, Eigen::Dynamic, 4, Eigen::ColMajor, kHiders, 4>;
 
-Eigen::Vector3f rayTo(const Eigen::Vector3f& eye, const Eigen::Vector3f& point) {
-  return (eye - point).normalized();
-}
-
-/// How surely some hider stands between an oriented point and the eye that `ray` leads to: near the
-/// ray, and above the tangent plane, for what is nearer on the same slope is in nobody's way.
+/// How surely some hider stands between an oriented point and the eye: near the ray, not beyond the
+/// eye, which may stand in a hollow, and above the tangent plane, for what is nearer on the same
+/// slope is in nobody's way.
 float hidden(const Hiders& hiders, const Eigen::Vector3f& point, const Eigen::Vector3f& normal,
-             const Eigen::Vector3f& ray) {
+             const Eigen::Vector3f& eye) {
   if (hiders.rows() == 0) return 0.0F;
+  const float distance = (eye - point).norm();
+  const Eigen::Vector3f ray = (eye - point) / distance;
   const auto x = hiders.col(0) - point.x(), y = hiders.col(1) - point.y(),
              z = hiders.col(2) - point.z();
   const auto height = x * normal.x() + y * normal.y() + z * normal.z();
   const auto along = x * ray.x() + y * ray.y() + z * ray.z();
   const auto squared_away = x.square() + y.square() + z.square() - along.square();
   const auto near = 2.0F - squared_away * (2.0F / (kHiderRadius * kHiderRadius));
-  return (hiders.col(3) * near.max(0.0F).min(1.0F) *
+  const auto before = (distance - along) * (1.0F / kHiderRadius);
+  return (hiders.col(3) * near.max(0.0F).min(1.0F) * before.max(0.0F).min(1.0F) *
           (height * (1.0F / kHidingHeight)).max(0.0F).min(1.0F))
       .maxCoeff();
 }
@@ -54,7 +54,7 @@ void Visibility::update(const PointCloud& moved, const std::optional<Eigen::Vect
   visibility.setOnes(moved.size());
   if (!eye) return;
   for (Eigen::Index i = 0; i < moved.size(); ++i) {
-    const float cosine = moved.normals.col(i).dot(rayTo(*eye, moved.points.col(i)));
+    const float cosine = moved.normals.col(i).dot((*eye - moved.points.col(i)).normalized());
     visibility[i] = std::clamp((cosine - kGrazingCosine) / kGrazingRange, 0.0F, 1.0F);
   }
   Hiders hiders(kHiders, 4);
@@ -66,8 +66,7 @@ void Visibility::update(const PointCloud& moved, const std::optional<Eigen::Vect
   hiders.conservativeResize(count, 4);
   for (Eigen::Index i = 0; i < moved.size(); ++i) {
     if (visibility[i] == 0.0F) continue;
-    const Eigen::Vector3f point = moved.points.col(i);
-    visibility[i] *= 1.0F - hidden(hiders, point, moved.normals.col(i), rayTo(*eye, point));
+    visibility[i] *= 1.0F - hidden(hiders, moved.points.col(i), moved.normals.col(i), *eye);
   }
 }
 

@@ -14,13 +14,14 @@ Json protocolsJson(const std::vector<Protocol>& protocols) {
   for (const Protocol protocol : protocols) {
     const View view = viewOf(protocol);
     constexpr const char* kTargets[] = {"paired", "permuted", "resampled", "depth image"};
-    json[toString(protocol)] = {{"target", kTargets[static_cast<int>(view.target)]},
-                                {"visible_share", view.visible_share},
-                                {"rotation_degrees", view.rotation},
-                                {"translation_of_half_extent", view.translation},
-                                {"offset_mm", 1000.0 * view.offset},
-                                {"noise_mm", 1000.0 * view.noise},
-                                {"outlier_share", view.outlier_share}};
+    Json& entry = json[toString(protocol)];
+    entry = {{"target", kTargets[static_cast<int>(view.target)]},
+             {"rotation_degrees", view.rotation},
+             {"translation_of_half_extent", view.translation},
+             {"offset_mm", 1000.0 * view.offset},
+             {"noise_mm", 1000.0 * view.noise},
+             {"outlier_share", view.outlier_share}};
+    if (view.target != View::Target::kDepthImage) entry["visible_share"] = view.visible_share;
   }
   return json;
 }

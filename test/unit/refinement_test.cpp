@@ -90,6 +90,13 @@ TEST(Refinement, TellsWholeSurfacesFromViewsOfOneSide) {
   }
 }
 
+PointCloud joined(const PointCloud& a, const PointCloud& b) {
+  PointCloud both{Points(3, a.size() + b.size()), Points(3, a.size() + b.size())};
+  both.points << a.points, b.points;
+  both.normals << a.normals, b.normals;
+  return both;
+}
+
 /// One surface of a bowl that is open at the top: a lower half sphere, normals outwards or inwards.
 PointCloud halfSphere(float radius, bool outwards, Eigen::Index count, std::uint64_t seed) {
   Random random(seed);
@@ -104,11 +111,7 @@ PointCloud halfSphere(float radius, bool outwards, Eigen::Index count, std::uint
 }
 
 TEST(Refinement, BelievesTheViewpointOfAHollowSeenFromWithinButNoWrongOne) {
-  const PointCloud outside = halfSphere(1.0F, true, 600, 1);
-  const PointCloud inside = halfSphere(0.7F, false, 300, 2);
-  PointCloud bowl{Points(3, 900), Points(3, 900)};
-  bowl.points << outside.points, inside.points;
-  bowl.normals << outside.normals, inside.normals;
+  const PointCloud bowl = joined(halfSphere(1.0F, true, 600, 1), halfSphere(0.7F, false, 300, 2));
   ThreadTeam team(1);
   Refinement refinement(bowl, {}, selectKernels(), team);
 
@@ -123,6 +126,34 @@ TEST(Refinement, BelievesTheViewpointOfAHollowSeenFromWithinButNoWrongOne) {
   const Sighting back = refinement.sight({halfSphere(1.0F, true, 600, 4).points, {}, above});
   ASSERT_FALSE(back.whole);
   EXPECT_LT(back.eye->z(), -1.0F);
+}
+
+/// One face of a flat lobe: a square of side 1.6 at a height of z, normals up or down.
+PointCloud face(float z, bool up, Eigen::Index count, std::uint64_t seed) {
+  Random random(seed);
+  PointCloud made{Points(3, count), Points::Zero(3, count)};
+  for (Eigen::Index i = 0; i < count; ++i) {
+    made.points.col(i) = random.uniformVector({-0.8, -0.8, z}, {0.8, 0.8, z}).cast<float>();
+  }
+  made.normals.row(2).setConstant(up ? 1.0F : -1.0F);
+  return made;
+}
+
+TEST(Refinement, DoesNotDrawAHiddenLobeToTheOneThatHidesIt) {
+  const PointCloud front = joined(face(0.2F, true, 225, 1), face(0.1F, false, 225, 2));
+  const PointCloud back = joined(face(-0.1F, true, 225, 3), face(-0.2F, false, 225, 4));
+  const PointCloud both = joined(front, back);
+  const Points seen = face(0.2F, true, 400, 5).points;
+  ThreadTeam team(1);
+  Refinement refinement(both, {}, selectKernels(), team);
+
+  const Sighting sighting = refinement.sight({seen, {}, Eigen::Vector3f(0, 0, 4)});
+  ASSERT_FALSE(sighting.whole);
+  const Refined refined =
+      refinement.refine(sighting, {Eigen::Isometry3f::Identity(), Points::Zero(3, 900)});
+  const Points moved = refined.pose * (both.points + refinement.prior()->displacements(
+                                                         both.points, refined.coefficients));
+  EXPECT_LT(rootMeanSquareDistance(both.points, moved), 0.03);
 }
 
 TEST(Refinement, FitsBetterFlippedWhereItLiesUpsideDown) {

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
 
 #include "unirit/random.hpp"
@@ -82,6 +83,13 @@ TEST(Visibility, OfAConvexSurfaceIsThatOfItsFacingPart) {
     const float cosine = point.dot((kEye - point).normalized());
     EXPECT_NEAR(seen[i], std::clamp((cosine - 0.1F) / 0.3F, 0.0F, 1.0F), 1e-3F) << cosine;
   }
+}
+
+TEST(Visibility, OfAHollowIsNotLostBehindItsOtherWallBeyondTheEye) {
+  PointCloud bowl = sphere(2000);
+  bowl.points.row(2) = -bowl.points.row(2).cwiseAbs();
+  bowl.normals = -bowl.points;
+  EXPECT_GT(visibility(bowl, {0.0F, 0.0F, -0.4F}).mean(), 0.8F);
 }
 
 TEST(Visibility, FollowsTheSurfaceWhateverTheSequenceOfItsSamples) {
