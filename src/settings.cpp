@@ -13,7 +13,8 @@ namespace unirit {
 namespace {
 
 constexpr std::array<Stage, 3> kStages{Stage::kRigid, Stage::kNonRigid, Stage::kRefine};
-constexpr std::array<Pairing, 3> kPairings{Pairing::kNearest, Pairing::kNone, Pairing::kRow};
+constexpr std::array<Pairing, 4> kPairings{Pairing::kNearest, Pairing::kOffsets, Pairing::kNone,
+                                           Pairing::kRow};
 
 Stage stageFromString(const std::string& name) {
   for (const Stage stage : kStages) {
@@ -29,6 +30,8 @@ const char* toString(Pairing pairing) {
   switch (pairing) {
     case Pairing::kNearest:
       return "nearest";
+    case Pairing::kOffsets:
+      return "offsets";
     case Pairing::kNone:
       return "none";
     case Pairing::kRow:
@@ -65,7 +68,7 @@ Pairing pairingFromString(const std::string& name) {
     if (name == toString(pairing)) return pairing;
   }
   throw std::invalid_argument("pairing: unknown pairing '" + name +
-                              "', known are nearest, none, row");
+                              "', known are nearest, offsets, none, row");
 }
 
 Correspondence correspondenceFromString(const std::string& name) {

@@ -6,9 +6,11 @@
 
 namespace unirit {
 
-/// What stands in for the target's row in the non-rigid decoder's input.
+/// What of the other cloud the network reads beside a point: in the non-rigid decoder, where the
+/// published network reads the target's row, and in one case in the encoders too.
 enum class Pairing {
   kNearest,  ///< offset to the nearest target point: independent of the order of either cloud
+  kOffsets,  ///< the same, and in every encoder the offset to the nearest point of the other cloud
   kNone,     ///< nothing, as in the Free Point Transformer
   kRow,      ///< row i of the target, as published; only to reproduce the published tables
 };

@@ -5,26 +5,25 @@ namespace unirit {
 namespace {
 
 template <class Widths>
-void append(std::vector<LayerShape>& shapes, const std::string& name, const Widths& widths) {
-  for (std::size_t i = 0; i + 1 < widths.size(); ++i) {
-    shapes.push_back({name + "." + std::to_string(i), widths[i], widths[i + 1]});
+void append(std::vector<LayerShape>& shapes, const std::string& name, int inputs,
+            const Widths& widths) {
+  for (std::size_t i = 0; i < widths.size(); ++i) {
+    shapes.push_back({name + "." + std::to_string(i), inputs, widths[i]});
+    inputs = widths[i];
   }
 }
 
 }  // namespace
 
 std::vector<LayerShape> layerShapes(Pairing pairing) {
-  std::vector<int> decoder{nonRigidDecoderInputs(pairing)};
-  decoder.insert(decoder.end(), kNonRigidDecoderHiddenWidths.begin(),
-                 kNonRigidDecoderHiddenWidths.end());
-
+  const int inputs = encoderInputs(pairing);
   std::vector<LayerShape> shapes;
-  append(shapes, "rigid.source_encoder", kEncoderWidths);
-  append(shapes, "rigid.target_encoder", kEncoderWidths);
-  append(shapes, "rigid.decoder", kRigidDecoderWidths);
-  append(shapes, "nonrigid.source_encoder", kEncoderWidths);
-  append(shapes, "nonrigid.target_encoder", kEncoderWidths);
-  append(shapes, "nonrigid.decoder", decoder);
+  append(shapes, "rigid.source_encoder", inputs, kEncoderWidths);
+  append(shapes, "rigid.target_encoder", inputs, kEncoderWidths);
+  append(shapes, "rigid.decoder", 2 * kFeatureSize, kRigidDecoderWidths);
+  append(shapes, "nonrigid.source_encoder", inputs, kEncoderWidths);
+  append(shapes, "nonrigid.target_encoder", inputs, kEncoderWidths);
+  append(shapes, "nonrigid.decoder", nonRigidDecoderInputs(pairing), kNonRigidDecoderWidths);
   return shapes;
 }
 

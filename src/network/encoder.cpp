@@ -6,7 +6,7 @@
 namespace unirit {
 namespace {
 
-constexpr int kLastLayer = static_cast<int>(kEncoderWidths.size()) - 2;
+constexpr int kLastLayer = static_cast<int>(kEncoderWidths.size()) - 1;
 
 }  // namespace
 
@@ -15,13 +15,16 @@ Encoder::Encoder(const Kernels& kernels, const Weights& weights, const std::stri
       last_(kernels, weights.layers.at(name + "." + std::to_string(kLastLayer)),
             Activation::kRelu) {}
 
-void Encoder::encode(const Points& points, float* feature, Workspace& workspace) const {
+void Encoder::encode(const Points& points, const NearestOffsets* offsets, float* feature,
+                     Workspace& workspace) const {
   for (Scratch& scratch : workspace.scratches()) {
     std::fill_n(scratch.maxima.data(), kFeatureSize, 0.0F);
   }
   const Kernels& kernels = workspace.kernels();
   workspace.forEachBlock(points.cols(), [&](Scratch& scratch, long begin, long count) {
-    const RowsView input{points.data() + 3 * begin, 3, count};
+    const RowsView input = offsets != nullptr
+                               ? offsets->rows(points, begin, count, scratch, kernels)
+                               : RowsView{points.data() + 3 * begin, 3, count};
     kernels.denseMaximum(last_.view(), runLayers(kernels, layers_, input, scratch),
                          scratch.maxima.data());
   });

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "dense_layer.hpp"
+#include "nearest_offsets.hpp"
 #include "unirit/point_cloud.hpp"
 
 namespace unirit {
@@ -14,9 +15,11 @@ class Encoder {
  public:
   Encoder(const Kernels& kernels, const Weights& weights, const std::string& name);
 
-  /// Writes the kFeatureSize numbers of the cloud's feature. The last layer's outputs are never
-  /// stored: each block of points only raises the maxima, which a ReLU starts at zero.
-  void encode(const Points& points, float* feature, Workspace& workspace) const;
+  /// Writes the kFeatureSize numbers of the cloud's feature. `offsets`, to the other cloud, are
+  /// given where the pairing is offsets, else null. The last layer's outputs are never stored: each
+  /// block of points only raises the maxima, which a ReLU starts at zero.
+  void encode(const Points& points, const NearestOffsets* offsets, float* feature,
+              Workspace& workspace) const;
 
  private:
   std::vector<DenseLayer> layers_;  ///< all but the last

@@ -6,10 +6,11 @@ namespace {
 
 /// Of a stack of layers, for one row.
 template <class Widths>
-double multiplyAddsPerRow(const Widths& widths) {
+double multiplyAddsPerRow(int inputs, const Widths& widths) {
   double sum = 0.0;
-  for (std::size_t i = 0; i + 1 < widths.size(); ++i) {
-    sum += static_cast<double>(widths[i]) * widths[i + 1];
+  for (const int outputs : widths) {
+    sum += static_cast<double>(inputs) * outputs;
+    inputs = outputs;
   }
   return sum;
 }
@@ -20,17 +21,16 @@ double multiplyAdds(Eigen::Index source_points, Eigen::Index target_points, int 
                     Pairing pairing, bool with_savings) {
   const auto sources = static_cast<double>(source_points);
   const auto targets = static_cast<double>(target_points);
-  const double encoder = multiplyAddsPerRow(kEncoderWidths);
-  const double rigid = encoder * (rigid_iterations * sources + targets) +
-                       rigid_iterations * multiplyAddsPerRow(kRigidDecoderWidths);
+  const double encoder = multiplyAddsPerRow(encoderInputs(pairing), kEncoderWidths);
+  // what the target's points read changes with the source's pose where they read the way to it
+  const int target_encodings = pairing == Pairing::kOffsets ? rigid_iterations : 1;
+  const double rigid = encoder * (rigid_iterations * sources + target_encodings * targets) +
+                       rigid_iterations * multiplyAddsPerRow(2 * kFeatureSize, kRigidDecoderWidths);
 
-  constexpr double kFirstOutputs = kNonRigidDecoderHiddenWidths.front();
-  constexpr double kFeatureColumns = 2.0 * kFeatureSize * kFirstOutputs;
-  const double point_columns = nonRigidDecoderInputs(pairing) * kFirstOutputs - kFeatureColumns;
-  const double nonrigid =
-      encoder * (sources + targets) +
-      sources * (point_columns + multiplyAddsPerRow(kNonRigidDecoderHiddenWidths)) +
-      (with_savings ? 1.0 : sources) * kFeatureColumns;
+  constexpr double kFeatureColumns = 2.0 * kFeatureSize * kNonRigidDecoderWidths.front();
+  const double decoder = multiplyAddsPerRow(nonRigidDecoderInputs(pairing), kNonRigidDecoderWidths);
+  const double nonrigid = encoder * (sources + targets) + sources * (decoder - kFeatureColumns) +
+                          (with_savings ? 1.0 : sources) * kFeatureColumns;
   return rigid + nonrigid;
 }
 

@@ -45,6 +45,13 @@ struct Network::Implementation {
         rigid_iterations(settings.rigid_iterations),
         workspace(selectKernels(), threads) {}
 
+  /// To the nearest of `others`, where the encoders read them.
+  const NearestOffsets* offsetsTo(const Points& others, NearestOffsets& offsets) const {
+    if (pairing != Pairing::kOffsets) return nullptr;
+    offsets.setOthers(others);
+    return &offsets;
+  }
+
   std::shared_ptr<const Weights> weights;
   Pairing pairing;
   int rigid_iterations;
@@ -57,6 +64,8 @@ struct Network::Implementation {
   NonRigidDecoder nonrigid_decoder{workspace.kernels(), *weights};
   Eigen::VectorXf rigid_features = Eigen::VectorXf::Zero(2 * kFeatureSize);
   Eigen::VectorXf nonrigid_features = Eigen::VectorXf::Zero(2 * kFeatureSize);
+  NearestOffsets to_source;
+  NearestOffsets to_target;
   Points moved;
 };
 
@@ -77,14 +86,17 @@ Eigen::Isometry3f Network::estimateRigid(const Points& source, const Points& tar
   auto& network = *implementation_;
   float* features = network.rigid_features.data();
 
-  // The target stands still: its feature is computed once
-  network.rigid_target.encode(target, features + kFeatureSize, network.workspace);
-
+  const NearestOffsets* to_target = network.offsetsTo(target, network.to_target);
   network.moved = source;
   Eigen::Quaternionf rotation = Eigen::Quaternionf::Identity();
   Eigen::Isometry3f transform = Eigen::Isometry3f::Identity();
   for (int i = 0; i < network.rigid_iterations; ++i) {
-    network.rigid_source.encode(network.moved, features, network.workspace);
+    const NearestOffsets* to_source = network.offsetsTo(network.moved, network.to_source);
+    network.rigid_source.encode(network.moved, to_target, features, network.workspace);
+    // Unless it reads the way to the source, the target's feature stands still
+    if (i == 0 || to_source != nullptr) {
+      network.rigid_target.encode(target, to_source, features + kFeatureSize, network.workspace);
+    }
     const RigidStep step = network.rigid_decoder.decode(features, network.workspace);
 
     // Apply the step
@@ -126,8 +138,10 @@ void Network::estimateDisplacements(const Points& source, const Points& target,
         "queries: with pairing row they must be the source's points, as many as the target's");
   }
   float* features = network.nonrigid_features.data();
-  network.nonrigid_source.encode(source, features, network.workspace);
-  network.nonrigid_target.encode(target, features + kFeatureSize, network.workspace);
+  network.nonrigid_source.encode(source, network.offsetsTo(target, network.to_target), features,
+                                 network.workspace);
+  network.nonrigid_target.encode(target, network.offsetsTo(source, network.to_source),
+                                 features + kFeatureSize, network.workspace);
   network.nonrigid_decoder.decode(features, target, queries, displacements, network.workspace);
 }
 

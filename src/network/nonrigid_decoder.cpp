@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "nonrigid_decoder.hpp"
 
-#include <algorithm>
-
 namespace unirit {
 namespace {
 
-constexpr int kLastLayer = static_cast<int>(kNonRigidDecoderHiddenWidths.size()) - 1;
+constexpr int kLastLayer = static_cast<int>(kNonRigidDecoderWidths.size()) - 1;
 constexpr Eigen::Index kFeatureColumns = 2 * kFeatureSize;
+
+bool readsOffset(Pairing pairing) {
+  return pairing == Pairing::kNearest || pairing == Pairing::kOffsets;
+}
 
 const Layer& firstLayer(const Weights& weights) { return weights.layers.at("nonrigid.decoder.0"); }
 
@@ -35,13 +37,8 @@ NonRigidDecoder::NonRigidDecoder(const Kernels& kernels, const Weights& weights)
 void NonRigidDecoder::decode(const float* features, const Points& target, const Points& queries,
                              Points& displacements, Workspace& workspace) {
   feature_layer_.applyToRow(features, feature_outputs_.data(), workspace);
-  if (pairing_ == Pairing::kNearest) {
-    // Among targets equally near the first wins: sorted, that does not depend on their order.
-    sorted_target_.resize(static_cast<std::size_t>(target.cols()));
-    for (Eigen::Index i = 0; i < target.cols(); ++i) {
-      sorted_target_[static_cast<std::size_t>(i)] = {target(0, i), target(1, i), target(2, i)};
-    }
-    std::sort(sorted_target_.begin(), sorted_target_.end());
+  if (readsOffset(pairing_)) {
+    to_target_.setOthers(target);
   }
   displacements.resize(3, queries.cols());
 
@@ -63,25 +60,15 @@ void NonRigidDecoder::decode(const float* features, const Points& target, const 
 RowsView NonRigidDecoder::pairedInputs(const Points& queries, long begin, long count,
                                        const Points& target, Scratch& scratch,
                                        const Kernels& kernels) const {
-  const float* points = queries.data() + 3 * begin;
-  if (pairing_ == Pairing::kNone) {
-    return {points, 3, count};
+  if (readsOffset(pairing_)) {
+    return to_target_.rows(queries, begin, count, scratch, kernels);
   }
-  if (pairing_ == Pairing::kNearest) {
-    kernels.nearest(points, count, sorted_target_.front().data(), target.cols(),
-                    scratch.nearest.data());
+  if (pairing_ == Pairing::kNone) {
+    return {queries.data() + 3 * begin, 3, count};
   }
   Eigen::Map<Eigen::Matrix<float, 6, Eigen::Dynamic>> inputs(scratch.inputs.data(), 6, count);
-  for (long i = 0; i < count; ++i) {
-    const auto query = queries.col(begin + i);
-    inputs.col(i).head<3>() = query;
-    if (pairing_ == Pairing::kRow) {
-      inputs.col(i).tail<3>() = target.col(begin + i);
-    } else {
-      const auto& nearest = sorted_target_[static_cast<std::size_t>(scratch.nearest[i])];
-      inputs.col(i).tail<3>() = Eigen::Map<const Eigen::Vector3f>(nearest.data()) - query;
-    }
-  }
+  inputs.topRows<3>() = queries.middleCols(begin, count);
+  inputs.bottomRows<3>() = target.middleCols(begin, count);
   return {scratch.inputs.data(), 6, count};
 }
 

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <array>
 #include <vector>
 
 #include "dense_layer.hpp"
+#include "nearest_offsets.hpp"
 #include "unirit/point_cloud.hpp"
 
 namespace unirit {
@@ -28,7 +28,7 @@ class NonRigidDecoder {
   DenseLayer feature_layer_;        ///< its columns of the features
   std::vector<DenseLayer> layers_;  ///< those that follow
   AlignedFloats feature_outputs_;
-  std::vector<std::array<float, 3>> sorted_target_;
+  NearestOffsets to_target_;
 };
 
 }  // namespace unirit

@@ -7,7 +7,7 @@
 namespace unirit {
 namespace {
 
-constexpr int kLastLayer = static_cast<int>(kRigidDecoderWidths.size()) - 2;
+constexpr int kLastLayer = static_cast<int>(kRigidDecoderWidths.size()) - 1;
 constexpr float kMinNorm = 1e-12F;
 
 }  // namespace

@@ -8,16 +8,19 @@
 namespace unirit::training {
 namespace {
 
-std::vector<int> nonRigidDecoderWidths(Pairing pairing) {
-  std::vector<int> widths{nonRigidDecoderInputs(pairing)};
-  widths.insert(widths.end(), kNonRigidDecoderHiddenWidths.begin(),
-                kNonRigidDecoderHiddenWidths.end());
+/// Inputs and outputs of a stack of layers in one row.
+template <std::size_t Size>
+std::vector<int> stack(int inputs, const std::array<int, Size>& outputs) {
+  std::vector<int> widths{inputs};
+  widths.insert(widths.end(), outputs.begin(), outputs.end());
   return widths;
 }
 
-template <std::size_t Size>
-std::vector<int> toVector(const std::array<int, Size>& widths) {
-  return {widths.begin(), widths.end()};
+/// What an encoder reads of `points` beside the other cloud: [B, N, encoderInputs(pairing)].
+torch::Tensor encoderInput(Pairing pairing, const torch::Tensor& points,
+                           const torch::Tensor& other) {
+  if (pairing != Pairing::kOffsets) return points;
+  return torch::cat({points, offsets(points, other)}, 2);
 }
 
 /// Unit quaternions w x y z, [B, 4], to rotations, [B, 3, 3].
@@ -54,7 +57,8 @@ torch::Tensor PerceptronImpl::continueFrom(torch::Tensor first_output) {
   return linear_end_ ? values : torch::relu(values);
 }
 
-EncoderImpl::EncoderImpl() : PerceptronImpl(toVector(kEncoderWidths), false) {}
+EncoderImpl::EncoderImpl(Pairing pairing)
+    : PerceptronImpl(stack(encoderInputs(pairing), kEncoderWidths), false) {}
 
 torch::Tensor EncoderImpl::forward(torch::Tensor points) {
   torch::Tensor values = std::move(points);
@@ -69,37 +73,43 @@ torch::Tensor Pose::apply(const torch::Tensor& points) const {
   return torch::baddbmm(translation.unsqueeze(1), points, rotation.transpose(1, 2));
 }
 
-RigidModuleImpl::RigidModuleImpl()
-    : source_encoder_(register_module("source_encoder", Encoder())),
-      target_encoder_(register_module("target_encoder", Encoder())),
-      decoder_(register_module("decoder", Perceptron(toVector(kRigidDecoderWidths), true))) {}
+RigidModuleImpl::RigidModuleImpl(Pairing pairing)
+    : pairing_(pairing),
+      source_encoder_(register_module("source_encoder", Encoder(pairing))),
+      target_encoder_(register_module("target_encoder", Encoder(pairing))),
+      decoder_(register_module("decoder",
+                               Perceptron(stack(2 * kFeatureSize, kRigidDecoderWidths), true))) {}
 
-torch::Tensor RigidModuleImpl::encodeTarget(const torch::Tensor& target) {
-  return target_encoder_->forward(target);
-}
-
-Pose RigidModuleImpl::forward(const torch::Tensor& moved_source,
-                              const torch::Tensor& target_feature) {
-  const auto source_feature = source_encoder_->forward(moved_source);
+Pose RigidModuleImpl::forward(const torch::Tensor& moved_source, const torch::Tensor& target,
+                              torch::Tensor& target_feature) {
+  if (!target_feature.defined() || pairing_ == Pairing::kOffsets) {
+    target_feature = target_encoder_->forward(encoderInput(pairing_, target, moved_source));
+  }
+  const auto source_feature =
+      source_encoder_->forward(encoderInput(pairing_, moved_source, target));
   const auto output = decoder_->forward(torch::cat({source_feature, target_feature}, 1));
   return {rotationOf(output.slice(1, 0, 4)), output.slice(1, 4, 7)};
 }
 
 NonRigidModuleImpl::NonRigidModuleImpl(Pairing pairing)
     : pairing_(pairing),
-      source_encoder_(register_module("source_encoder", Encoder())),
-      target_encoder_(register_module("target_encoder", Encoder())),
-      decoder_(register_module("decoder", Perceptron(nonRigidDecoderWidths(pairing), true))) {}
+      source_encoder_(register_module("source_encoder", Encoder(pairing))),
+      target_encoder_(register_module("target_encoder", Encoder(pairing))),
+      decoder_(register_module(
+          "decoder",
+          Perceptron(stack(nonRigidDecoderInputs(pairing), kNonRigidDecoderWidths), true))) {}
 
 torch::Tensor NonRigidModuleImpl::forward(const torch::Tensor& moved_source,
                                           const torch::Tensor& target) {
   const auto features =
-      torch::cat({source_encoder_->forward(moved_source), target_encoder_->forward(target)}, 1);
+      torch::cat({source_encoder_->forward(encoderInput(pairing_, moved_source, target)),
+                  target_encoder_->forward(encoderInput(pairing_, target, moved_source))},
+                 1);
   std::vector<torch::Tensor> local{moved_source};
-  if (pairing_ == Pairing::kRow) local.push_back(target);
-  if (pairing_ == Pairing::kNearest) {
-    const auto index = nearest(moved_source, target).second;
-    local.push_back(target.gather(1, index.unsqueeze(2).expand({-1, -1, 3})) - moved_source);
+  if (pairing_ == Pairing::kRow) {
+    local.push_back(target);
+  } else if (pairing_ != Pairing::kNone) {
+    local.push_back(offsets(moved_source, target));
   }
 
   // The first layer is linear: its global columns are multiplied once a pair, not once a point.
@@ -112,19 +122,20 @@ torch::Tensor NonRigidModuleImpl::forward(const torch::Tensor& moved_source,
 }
 
 UniritImpl::UniritImpl(Pairing pairing)
-    : rigid(register_module("rigid", RigidModule())),
+    : rigid(register_module("rigid", RigidModule(pairing))),
       nonrigid(register_module("nonrigid", NonRigidModule(pairing))),
       pairing_(pairing) {}
 
 void UniritImpl::setWeights(const Weights& weights) {
-  if (weights.pairing != pairing_) {
+  const bool widened = weights.pairing == Pairing::kNearest && pairing_ == Pairing::kOffsets;
+  if (weights.pairing != pairing_ && !widened) {
     throw std::invalid_argument(std::string("weights: their pairing is ") +
                                 toString(weights.pairing) + ", the network's " +
                                 toString(pairing_));
   }
   const torch::NoGradGuard no_grad;
   auto parameters = named_parameters();
-  for (const LayerShape& shape : layerShapes(pairing_)) {
+  for (const LayerShape& shape : layerShapes(weights.pairing)) {
     const auto layer = weights.layers.find(shape.name);
     if (layer == weights.layers.end()) {
       throw std::invalid_argument("weights: layer " + shape.name + " is missing");
@@ -132,8 +143,10 @@ void UniritImpl::setWeights(const Weights& weights) {
     using RowMajor = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
     RowMajor weight = layer->second.weight;
     Eigen::VectorXf bias = layer->second.bias;
-    parameters[shape.name + ".weight"].copy_(
-        torch::from_blob(weight.data(), {shape.outputs, shape.inputs}));
+    parameters[shape.name + ".weight"]
+        .zero_()
+        .slice(1, 0, shape.inputs)
+        .copy_(torch::from_blob(weight.data(), {shape.outputs, shape.inputs}));
     parameters[shape.name + ".bias"].copy_(torch::from_blob(bias.data(), {shape.outputs}));
   }
 }
@@ -153,15 +166,14 @@ Weights UniritImpl::weights() const {
   return weights;
 }
 
-std::pair<torch::Tensor, torch::Tensor> nearest(const torch::Tensor& from,
-                                                const torch::Tensor& to) {
+torch::Tensor offsets(const torch::Tensor& from, const torch::Tensor& to) {
   torch::Tensor index;
   {
     const torch::NoGradGuard no_grad;
+    const at::NoTF32Guard no_tf32;  // its distances do not tell near points apart
     index = torch::cdist(from, to).argmin(2);
   }
-  const auto neighbour = to.gather(1, index.unsqueeze(2).expand({-1, -1, 3}));
-  return {(from - neighbour).square().sum(2), index};
+  return to.gather(1, index.unsqueeze(2).expand({-1, -1, 3})) - from;
 }
 
 }  // namespace unirit::training

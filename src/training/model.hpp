@@ -30,11 +30,12 @@ class PerceptronImpl : public torch::nn::Module {
 };
 TORCH_MODULE(Perceptron);
 
-/// Shared perceptron over points, then the maximum: [B, N, 3] -> [B, 1024]. On the CPU the gradient
-/// of the last layer is taken only through the points that hold a maximum, which is exact.
+/// Shared perceptron over points, then the maximum: [B, N, encoderInputs(pairing)] -> [B, 1024]. On
+/// the CPU the gradient of the last layer is taken only through the points that hold a maximum,
+/// which is exact.
 class EncoderImpl : public PerceptronImpl {
  public:
-  EncoderImpl();
+  explicit EncoderImpl(Pairing pairing);
   torch::Tensor forward(torch::Tensor points);
 };
 TORCH_MODULE(Encoder);
@@ -50,11 +51,15 @@ struct Pose {
 /// One iteration of the paper's rigid module.
 class RigidModuleImpl : public torch::nn::Module {
  public:
-  RigidModuleImpl();
-  torch::Tensor encodeTarget(const torch::Tensor& target);
-  Pose forward(const torch::Tensor& moved_source, const torch::Tensor& target_feature);
+  explicit RigidModuleImpl(Pairing pairing);
+
+  /// `target_feature` is computed where it is undefined, as in the first iteration, or changes with
+  /// the source's pose.
+  Pose forward(const torch::Tensor& moved_source, const torch::Tensor& target,
+               torch::Tensor& target_feature);
 
  private:
+  Pairing pairing_;
   Encoder source_encoder_, target_encoder_;
   Perceptron decoder_;
 };
@@ -82,7 +87,8 @@ class UniritImpl : public torch::nn::Module {
   NonRigidModule nonrigid;
 
   /// Replaces every parameter; throws std::invalid_argument where the pairing is another or a layer
-  /// is missing.
+  /// is missing. Weights of pairing nearest serve pairing offsets, too: what the encoders read
+  /// beside a point then counts for nothing until it is trained.
   void setWeights(const Weights& weights);
 
   /// The parameters as a weights file holds them, without metadata.
@@ -95,7 +101,7 @@ class UniritImpl : public torch::nn::Module {
 };
 TORCH_MODULE(Unirit);
 
-/// Squared distances and indices of each point's nearest neighbour in `to`: [B, N] each.
-std::pair<torch::Tensor, torch::Tensor> nearest(const torch::Tensor& from, const torch::Tensor& to);
+/// From each point to its nearest neighbour in `to`: [B, N, 3].
+torch::Tensor offsets(const torch::Tensor& from, const torch::Tensor& to);
 
 }  // namespace unirit::training

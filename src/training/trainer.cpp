@@ -27,7 +27,7 @@ torch::Tensor rootMeanSquare(const torch::Tensor& offsets) {
 torch::Tensor distance(Loss loss, const torch::Tensor& moved, const torch::Tensor& truth,
                        const torch::Tensor& target) {
   if (loss == Loss::kSupervised) return rootMeanSquare(moved - truth).mean();
-  return (nearest(moved, target).first.mean(1) + 1e-12).sqrt().mean();
+  return rootMeanSquare(offsets(moved, target)).mean();
 }
 
 template <class Function>
@@ -54,9 +54,10 @@ torch::Tensor totalLoss(Unirit& model, const Batch& batch, const TrainingSetting
   torch::Tensor moved = batch.source;
   torch::Tensor rigid_loss = torch::zeros({}, moved.options());
   if (alpha < 1.0) {
-    const auto target_feature = model->rigid->encodeTarget(batch.target);
+    torch::Tensor target_feature;
     for (int i = 0; i < iterations; ++i) {
-      moved = model->rigid->forward(moved.detach(), target_feature).apply(moved.detach());
+      moved =
+          model->rigid->forward(moved.detach(), batch.target, target_feature).apply(moved.detach());
       rigid_loss = rigid_loss + distance(settings.loss, moved, batch.rigid, batch.target);
     }
     rigid_loss = rigid_loss / iterations;
@@ -134,9 +135,9 @@ ValidationErrors validate(Unirit& model, const ValidationSet& set,
                                    [&](const torch::Tensor& t) { return t.to(settings.device); });
     torch::Tensor moved = part.source;
     if (settings.alpha < 1.0) {
-      const auto feature = model->rigid->encodeTarget(part.target);
+      torch::Tensor target_feature;
       for (int i = 0; i < kValidationIterations; ++i) {
-        moved = model->rigid->forward(moved, feature).apply(moved);
+        moved = model->rigid->forward(moved, part.target, target_feature).apply(moved);
       }
     }
     rigid += (rootMeanSquare(moved - part.rigid) * part.scale).sum().item<double>();

@@ -74,13 +74,16 @@ void addOptions(CLI::App& app, Options& options) {
                  "Folder for checkpoint.pt, curves.csv and unirit.safetensors; a checkpoint found "
                  "there is resumed")
       ->required();
-  app.add_option("--start-from", options.start_from, "Weights file to start from (else He)");
+  app.add_option("--start-from", options.start_from,
+                 "Weights file to start from (else He); for pairing offsets one of pairing nearest "
+                 "serves, too");
   app.add_option("--method", options.method,
                  "unirit, or fpt: the non-rigid module alone, without pairing (Free Point "
                  "Transformer)")
       ->check(CLI::IsMember({"unirit", "fpt"}))
       ->capture_default_str();
-  app.add_option("--pairing", options.pairing, "nearest, none or row")->capture_default_str();
+  app.add_option("--pairing", options.pairing, "nearest, offsets, none or row")
+      ->capture_default_str();
   app.add_option("--target", options.target,
                  "What the target's points are: resampled on the deformed surface, or paired, the "
                  "source's own in their order (only to reproduce published tables)")

@@ -62,11 +62,12 @@ TEST_P(GoldenState, RigidModuleAgreesAfterEveryIteration) {
   const torch::NoGradGuard no_grad;
   std::vector<Eigen::Isometry3f> iterates;
   network_->estimateRigid(source_, target_, &iterates);
-  const auto feature = model_->rigid->encodeTarget(toTensor(target_));
+  const torch::Tensor target = toTensor(target_);
   torch::Tensor moved = toTensor(source_);
+  torch::Tensor target_feature;
   ASSERT_EQ(iterates.size(), 8U);
   for (const Eigen::Isometry3f& iterate : iterates) {
-    moved = model_->rigid->forward(moved, feature).apply(moved);
+    moved = model_->rigid->forward(moved, target, target_feature).apply(moved);
     const Points ours = iterate * source_;
     EXPECT_LT((ours - toPoints(moved)).cwiseAbs().maxCoeff(), kTolerance);
   }
@@ -85,15 +86,19 @@ TEST_P(GoldenState, WholeNetworkAgrees) {
   const torch::NoGradGuard no_grad;
   const Points moved = network_->estimateRigid(source_, target_) * source_;
   const Points ours = moved + network_->estimateDisplacements(moved, target_, moved);
-  const auto feature = model_->rigid->encodeTarget(toTensor(target_));
-  torch::Tensor tensor = toTensor(source_);
-  for (int i = 0; i < 8; ++i) tensor = model_->rigid->forward(tensor, feature).apply(tensor);
-  const auto theirs = tensor + model_->nonrigid->forward(tensor, toTensor(target_));
+  const torch::Tensor target = toTensor(target_);
+  torch::Tensor source = toTensor(source_);
+  torch::Tensor target_feature;
+  for (int i = 0; i < 8; ++i) {
+    source = model_->rigid->forward(source, target, target_feature).apply(source);
+  }
+  const auto theirs = source + model_->nonrigid->forward(source, target);
   EXPECT_LT((ours - toPoints(theirs)).cwiseAbs().maxCoeff(), 2.0F * kTolerance);
 }
 
 INSTANTIATE_TEST_SUITE_P(Pairings, GoldenState,
-                         testing::Values(Pairing::kNearest, Pairing::kNone, Pairing::kRow),
+                         testing::Values(Pairing::kNearest, Pairing::kOffsets, Pairing::kNone,
+                                         Pairing::kRow),
                          [](const auto& pairing) { return std::string(toString(pairing.param)); });
 
 }  // namespace

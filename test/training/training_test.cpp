@@ -82,6 +82,24 @@ TEST(Model, WeightsRoundTrip) {
   EXPECT_THROW(model->setWeights(randomWeights(Pairing::kNone, 2)), std::invalid_argument);
 }
 
+TEST(Model, WeightsOfPairingNearestDoTheSameWithPairingOffsets) {
+  const torch::NoGradGuard no_grad;
+  const Weights weights = randomWeights(Pairing::kNearest, 2);
+  const auto source = torch::randn({2, 50, 3}), target = torch::randn({2, 40, 3});
+  const auto outputs = [&](Pairing pairing) {
+    Unirit model(pairing);
+    model->setWeights(weights);
+    torch::Tensor feature;
+    return std::make_pair(model->rigid->forward(source, target, feature).apply(source),
+                          model->nonrigid->forward(source, target));
+  };
+  const auto nearest = outputs(Pairing::kNearest), offsets = outputs(Pairing::kOffsets);
+  EXPECT_TRUE(torch::allclose(nearest.first, offsets.first, 1e-5, 1e-5));
+  EXPECT_TRUE(torch::allclose(nearest.second, offsets.second, 1e-5, 1e-5));
+  EXPECT_THROW(Unirit(Pairing::kNearest)->setWeights(randomWeights(Pairing::kOffsets, 2)),
+               std::invalid_argument);
+}
+
 TEST_F(Training, BatchesDependOnSeedAndNumberAlone) {
   const Batch a = makeBatch(organs_, settings_.batch, 1, 5),
               b = makeBatch(organs_, settings_.batch, 1, 5);

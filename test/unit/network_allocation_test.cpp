@@ -21,15 +21,17 @@ TEST_F(NetworkAllocation, nothingIsAllocatedAfterTheFirstCall) {
   const Points source = reference::randomPoints(203, 1);
   const Points target = reference::randomPoints(131, 2);
   const Points queries = reference::randomPoints(317, 3);
-  for (const int threads : {1, 2}) {
-    Network network(reference::loudWeights(Pairing::kNearest), {}, threads);
-    Points displacements;
-    const auto forward = [&] {
-      network.estimateRigid(source, target);
-      network.estimateDisplacements(source, target, queries, displacements);
-    };
-    EXPECT_GT(countAllocations(forward), 0) << "the first call sizes the buffers";
-    EXPECT_EQ(countAllocations(forward), 0) << threads << " threads";
+  for (const Pairing pairing : {Pairing::kNearest, Pairing::kOffsets}) {
+    for (const int threads : {1, 2}) {
+      Network network(reference::loudWeights(pairing), {8, pairing}, threads);
+      Points displacements;
+      const auto forward = [&] {
+        network.estimateRigid(source, target);
+        network.estimateDisplacements(source, target, queries, displacements);
+      };
+      EXPECT_GT(countAllocations(forward), 0) << "the first call sizes the buffers";
+      EXPECT_EQ(countAllocations(forward), 0) << toString(pairing) << ", " << threads << " threads";
+    }
   }
 }
 

@@ -35,17 +35,20 @@ class NetworkDeterminism : public InstructionSetTest {
 };
 
 TEST_P(NetworkDeterminism, anyNumberOfThreadsGivesTheSameBits) {
-  const Output one = run(source_, target_, queries_, 1);
-  for (const int threads : {2, 3}) {
-    const Output other = run(source_, target_, queries_, threads);
-    EXPECT_EQ(other.transform, one.transform) << threads << " threads";
-    EXPECT_EQ(other.displacements, one.displacements) << threads << " threads";
+  for (const Pairing pairing : {Pairing::kNearest, Pairing::kOffsets}) {
+    pairing_ = pairing;
+    const Output one = run(source_, target_, queries_, 1);
+    for (const int threads : {2, 3}) {
+      const Output other = run(source_, target_, queries_, threads);
+      EXPECT_EQ(other.transform, one.transform) << threads << " threads";
+      EXPECT_EQ(other.displacements, one.displacements) << threads << " threads";
+    }
   }
 }
 
 TEST_P(NetworkDeterminism, theOrderOfTheCloudsChangesNoBit) {
   const auto query_order = shuffled(queries_.cols(), 6);
-  for (const Pairing pairing : {Pairing::kNearest, Pairing::kNone}) {
+  for (const Pairing pairing : {Pairing::kNearest, Pairing::kOffsets, Pairing::kNone}) {
     pairing_ = pairing;
     const Output straight = run(source_, target_, queries_);
     const Output shuffled_output =
@@ -86,14 +89,16 @@ TEST_P(NetworkDeterminism, aPointsDisplacementDoesNotDependOnTheOtherQueries) {
 }
 
 TEST_P(NetworkDeterminism, buffersOfAnEarlierCallLeaveNoTrace) {
-  Network network(loudWeights(Pairing::kNearest), {}, 2);
-  const Points first = network.estimateDisplacements(source_, target_, queries_);
-  const Eigen::Isometry3f rigid = network.estimateRigid(source_, target_);
-  const Points large = 100.0F * randomPoints(501, 9);
-  network.estimateDisplacements(large, large, large);
-  network.estimateRigid(large, randomPoints(7, 9));
-  EXPECT_EQ(network.estimateDisplacements(source_, target_, queries_), first);
-  EXPECT_EQ(network.estimateRigid(source_, target_).matrix(), rigid.matrix());
+  for (const Pairing pairing : {Pairing::kNearest, Pairing::kOffsets}) {
+    Network network(loudWeights(pairing), {8, pairing}, 2);
+    const Points first = network.estimateDisplacements(source_, target_, queries_);
+    const Eigen::Isometry3f rigid = network.estimateRigid(source_, target_);
+    const Points large = 100.0F * randomPoints(501, 9);
+    network.estimateDisplacements(large, large, large);
+    network.estimateRigid(large, randomPoints(7, 9));
+    EXPECT_EQ(network.estimateDisplacements(source_, target_, queries_), first);
+    EXPECT_EQ(network.estimateRigid(source_, target_).matrix(), rigid.matrix());
+  }
 }
 
 UNIRIT_ON_EVERY_INSTRUCTION_SET(NetworkDeterminism);

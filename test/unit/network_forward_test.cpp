@@ -15,10 +15,10 @@ constexpr double kSavingsTolerance = 1e-5;  // what leaving out repeated product
 
 class NetworkForward : public InstructionSetTest {
  protected:
-  static void expectRigidAgrees(const Points& source, const Points& target, int iterations) {
-    const auto weights = loudWeights(Pairing::kNearest);
-    NetworkSettings settings;
-    settings.rigid_iterations = iterations;
+  static void expectRigidAgrees(Pairing pairing, const Points& source, const Points& target,
+                                int iterations) {
+    const auto weights = loudWeights(pairing);
+    const NetworkSettings settings{iterations, pairing};
     Network network(weights, settings, 2);
     std::vector<Eigen::Isometry3f> iterates;
     const Eigen::Isometry3f transform = network.estimateRigid(source, target, &iterates);
@@ -58,9 +58,7 @@ TEST_P(NetworkForward, featuresAgreeWithTheReference) {
   const Points source = randomPoints(203, 1);
   const Points target = randomPoints(131, 2);
   const auto weights = loudWeights(Pairing::kNearest);
-  NetworkSettings settings;
-  settings.rigid_iterations = 1;
-  Network network(weights, settings, 2);
+  Network network(weights, {1, Pairing::kNearest}, 2);
   network.estimateRigid(source, target);
   network.estimateDisplacements(source, target, source);
 
@@ -76,21 +74,24 @@ TEST_P(NetworkForward, featuresAgreeWithTheReference) {
 }
 
 TEST_P(NetworkForward, everyRigidIterateAgreesWithTheReference) {
-  expectRigidAgrees(randomPoints(203, 1), randomPoints(131, 2), 8);
+  for (const Pairing pairing : {Pairing::kNearest, Pairing::kOffsets}) {
+    expectRigidAgrees(pairing, randomPoints(203, 1), randomPoints(131, 2), 8);
+  }
 }
 
 TEST_P(NetworkForward, cloudsOfOnePointAreRegistered) {
-  expectRigidAgrees(randomPoints(1, 1), randomPoints(131, 2), 2);
-  expectRigidAgrees(randomPoints(131, 1), randomPoints(1, 2), 2);
-  expectDisplacementsAgree(Pairing::kNearest, randomPoints(1, 1), randomPoints(1, 2),
-                           randomPoints(1, 3));
+  for (const Pairing pairing : {Pairing::kNearest, Pairing::kOffsets}) {
+    expectRigidAgrees(pairing, randomPoints(1, 1), randomPoints(131, 2), 2);
+    expectRigidAgrees(pairing, randomPoints(131, 1), randomPoints(1, 2), 2);
+    expectDisplacementsAgree(pairing, randomPoints(1, 1), randomPoints(1, 2), randomPoints(1, 3));
+  }
 }
 
 TEST_P(NetworkForward, displacementsAgreeWithTheReferenceThatSavesNothing) {
-  expectDisplacementsAgree(Pairing::kNearest, randomPoints(203, 1), randomPoints(131, 2),
-                           randomPoints(317, 3));
-  expectDisplacementsAgree(Pairing::kNone, randomPoints(203, 1), randomPoints(131, 2),
-                           randomPoints(317, 3));
+  for (const Pairing pairing : {Pairing::kNearest, Pairing::kOffsets, Pairing::kNone}) {
+    expectDisplacementsAgree(pairing, randomPoints(203, 1), randomPoints(131, 2),
+                             randomPoints(317, 3));
+  }
   const Points source = randomPoints(203, 1);
   expectDisplacementsAgree(Pairing::kRow, source, randomPoints(203, 2), source);
 }

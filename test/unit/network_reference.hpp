@@ -30,9 +30,24 @@ inline Eigen::MatrixXd decode(const Weights& weights, const std::string& name,
   return values;
 }
 
+/// From each point to the nearest of the others.
+inline Eigen::Matrix3Xd offsets(const Eigen::Matrix3Xd& points, const Eigen::Matrix3Xd& others) {
+  Eigen::Matrix3Xd offsets(3, points.cols());
+  for (Eigen::Index i = 0; i < points.cols(); ++i) {
+    Eigen::Index nearest = 0;
+    (others.colwise() - points.col(i)).colwise().squaredNorm().minCoeff(&nearest);
+    offsets.col(i) = others.col(nearest) - points.col(i);
+  }
+  return offsets;
+}
+
 inline Eigen::VectorXd encode(const Weights& weights, const std::string& name,
-                              const Eigen::Matrix3Xd& points) {
-  Eigen::MatrixXd values = points;
+                              const Eigen::Matrix3Xd& points, const Eigen::Matrix3Xd& others) {
+  Eigen::MatrixXd values(encoderInputs(weights.pairing), points.cols());
+  values.topRows(3) = points;
+  if (weights.pairing == Pairing::kOffsets) {
+    values.bottomRows(3) = offsets(points, others);
+  }
   for (int i = 0; i < 5; ++i) {
     values = dense(weights, name + "." + std::to_string(i), values, true);
   }
@@ -42,8 +57,8 @@ inline Eigen::VectorXd encode(const Weights& weights, const std::string& name,
 inline Eigen::VectorXd features(const Weights& weights, const std::string& module,
                                 const Eigen::Matrix3Xd& source, const Eigen::Matrix3Xd& target) {
   Eigen::VectorXd both(2 * kFeatureSize);
-  both << encode(weights, module + ".source_encoder", source),
-      encode(weights, module + ".target_encoder", target);
+  both << encode(weights, module + ".source_encoder", source, target),
+      encode(weights, module + ".target_encoder", target, source);
   return both;
 }
 
@@ -73,13 +88,8 @@ inline Eigen::Matrix3Xd estimateDisplacements(const Weights& weights, const Poin
   inputs.middleRows(3, both.size()).colwise() = both;
   if (weights.pairing == Pairing::kRow) {
     inputs.bottomRows(3) = target.cast<double>();
-  }
-  if (weights.pairing == Pairing::kNearest) {
-    for (Eigen::Index i = 0; i < queries.cols(); ++i) {
-      Eigen::Index nearest = 0;
-      (target.colwise() - queries.col(i)).colwise().squaredNorm().minCoeff(&nearest);
-      inputs.col(i).tail<3>() = (target.col(nearest) - queries.col(i)).cast<double>();
-    }
+  } else if (weights.pairing != Pairing::kNone) {
+    inputs.bottomRows(3) = offsets(queries.cast<double>(), target.cast<double>());
   }
   return decode(weights, "nonrigid.decoder", inputs);
 }

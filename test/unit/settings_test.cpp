@@ -62,7 +62,8 @@ TEST(Stages, RefuseUnknownRepeatedReversedAndMissingNames) {
 }
 
 TEST(Pairing, NamesRoundTripAndUnknownOnesAreRefused) {
-  for (const Pairing pairing : {Pairing::kNearest, Pairing::kNone, Pairing::kRow}) {
+  for (const Pairing pairing :
+       {Pairing::kNearest, Pairing::kOffsets, Pairing::kNone, Pairing::kRow}) {
     EXPECT_EQ(pairingFromString(toString(pairing)), pairing);
   }
   EXPECT_THROW(pairingFromString("closest"), std::invalid_argument);

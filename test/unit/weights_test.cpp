@@ -54,7 +54,7 @@ TEST_F(WeightsFile, isTheSameAfterBeingReadAndWritten) {
 }
 
 TEST_F(WeightsFile, remembersEveryPairing) {
-  for (const Pairing pairing : {Pairing::kNone, Pairing::kRow}) {
+  for (const Pairing pairing : {Pairing::kOffsets, Pairing::kNone, Pairing::kRow}) {
     writeWeights(randomWeights(pairing, 1), path("other"));
     EXPECT_EQ(readWeights(path("other")).pairing, pairing);
   }

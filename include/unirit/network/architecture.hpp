@@ -9,12 +9,16 @@
 
 namespace unirit {
 
-/// Widths of the UniRiT network (Li et al., arXiv 2410.22909, section 4.2, and the FLOP counts of
-/// its table 1). Every layer but a decoder's last is followed by a ReLU; no normalisation layers.
-inline constexpr std::array<int, 6> kEncoderWidths{3, 64, 64, 64, 128, 1024};
-inline constexpr std::array<int, 7> kRigidDecoderWidths{2048, 1024, 1024, 512, 512, 256, 7};
-inline constexpr std::array<int, 6> kNonRigidDecoderHiddenWidths{1024, 512, 256, 128, 64, 3};
+/// Outputs of the UniRiT network's layers (Li et al., arXiv 2410.22909, section 4.2, and the FLOP
+/// counts of its table 1). Every layer but a decoder's last is followed by a ReLU; no normalisation
+/// layers.
+inline constexpr std::array<int, 5> kEncoderWidths{64, 64, 64, 128, 1024};
+inline constexpr std::array<int, 6> kRigidDecoderWidths{1024, 1024, 512, 512, 256, 7};
+inline constexpr std::array<int, 6> kNonRigidDecoderWidths{1024, 512, 256, 128, 64, 3};
 inline constexpr int kFeatureSize = 1024;
+
+/// Inputs of every encoder: point (3) and, with pairing offsets, the way to the other cloud (3).
+constexpr int encoderInputs(Pairing pairing) { return pairing == Pairing::kOffsets ? 6 : 3; }
 
 /// Inputs of the non-rigid decoder: point (3), two global features (2048), paired row (3 or none).
 constexpr int nonRigidDecoderInputs(Pairing pairing) {
