@@ -45,4 +45,5 @@ runTests "Running all tests" "$root/build"
 # Leaks are looked for; no library the unit tests use needs a suppression.
 export ASAN_OPTIONS=detect_leaks=1:strict_string_checks=1
 export UBSAN_OPTIONS=print_stacktrace=1
-runTests "Running the unit tests with sanitizers" "$root/build/sanitized" --label-regex '^unit$'
+runTests "Running the unit tests with sanitizers" "$root/build/sanitized" --label-regex '^unit$' \
+  --parallel "$(nproc)"
