@@ -237,6 +237,7 @@ void run(Options& options) {
   std::printf("training on %zu organs, validating on %zu\n", organs.size(), validation.size());
   std::printf(
       "of every validation protocol: rigid stage to the best rigid fit, final to the truth\n");
+  std::fflush(stdout);
 
   Progress last;
   model = train(organs, validation, training, output, model, [&](const Progress& progress) {
