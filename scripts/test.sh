@@ -23,7 +23,8 @@ runTests() {
   local log lines line
   log=$logs/test-$(basename "$2").log
   printf '[%(%H:%M:%S)T] %s\n' -1 "$1"
-  (cd "$2" && exec env -u DISPLAY ctest --output-on-failure --timeout 600 "${@:3}" 2>&1) |
+  (cd "$2" && exec env -u DISPLAY ctest --output-on-failure --timeout 600 --parallel "$(nproc)" \
+    "${@:3}" 2>&1) |
     tee "$log" || true # the lines tell
   mapfile -t lines < <(grep -E '^ *[0-9]+/[0-9]+ Test +#' "$log")
   for line in "${lines[@]:-no test was run}"; do
@@ -45,5 +46,4 @@ runTests "Running all tests" "$root/build"
 # Leaks are looked for; no library the unit tests use needs a suppression.
 export ASAN_OPTIONS=detect_leaks=1:strict_string_checks=1
 export UBSAN_OPTIONS=print_stacktrace=1
-runTests "Running the unit tests with sanitizers" "$root/build/sanitized" --label-regex '^unit$' \
-  --parallel "$(nproc)"
+runTests "Running the unit tests with sanitizers" "$root/build/sanitized" --label-regex '^unit$'

@@ -6,11 +6,9 @@ source_folder=$1
 build=$2
 install=$build/install
 
-# Not optimised: that takes twice the time and tells nothing more here.
 configure() {
   cmake -S "$source_folder" -B "$build" -G "Unix Makefiles" -DCMAKE_BUILD_TYPE=Release \
-    -DCMAKE_CXX_FLAGS_RELEASE=-O0 -DUNIRIT_ROS=OFF -DUNIRIT_TRAINING=OFF \
-    -DBUILD_TESTING=OFF -DUNIRIT_WERROR=ON \
+    -DUNIRIT_ROS=OFF -DUNIRIT_TRAINING=OFF -DBUILD_TESTING=OFF -DUNIRIT_WERROR=ON \
     -DCMAKE_DISABLE_FIND_PACKAGE_catkin=ON
 }
 
