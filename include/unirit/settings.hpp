@@ -7,12 +7,14 @@
 namespace unirit {
 
 /// What of the other cloud the network reads beside a point: in the non-rigid decoder, where the
-/// published network reads the target's row, and in one case in the encoders too.
+/// published network reads the target's row, and in one case in the encoders too. Checkpoints hold
+/// the number: new ones come last.
 enum class Pairing {
   kNearest,  ///< offset to the nearest target point: independent of the order of either cloud
-  kOffsets,  ///< the same, and in every encoder the offset to the nearest point of the other cloud
   kNone,     ///< nothing, as in the Free Point Transformer
   kRow,      ///< row i of the target, as published; only to reproduce the published tables
+  kOffsets,  ///< as nearest, and in every encoder the offset to the nearest point of the other
+             ///< cloud
 };
 
 /// The stages of a registration, in their order.

@@ -45,7 +45,7 @@ struct Network::Implementation {
         rigid_iterations(settings.rigid_iterations),
         workspace(selectKernels(), threads) {}
 
-  /// To the nearest of `others`, where the encoders read them.
+  /// To the nearest of `others`; null where the encoders do not read them.
   const NearestOffsets* offsetsTo(const Points& others, NearestOffsets& offsets) const {
     if (pairing != Pairing::kOffsets) return nullptr;
     offsets.setOthers(others);

@@ -23,7 +23,7 @@ struct Scratch {
   AlignedFloats activations[2] = {AlignedFloats(kBlockRows * kBlockStride),
                                   AlignedFloats(kBlockRows* kBlockStride)};
   AlignedFloats maxima{kFeatureSize};
-  AlignedFloats inputs{6 * kBlockRows};  ///< point and paired row
+  AlignedFloats inputs{6 * kBlockRows};  ///< a point and what is read beside it
   std::vector<int> nearest = std::vector<int>(kBlockRows);
 };
 

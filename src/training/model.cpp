@@ -170,7 +170,7 @@ torch::Tensor offsets(const torch::Tensor& from, const torch::Tensor& to) {
   torch::Tensor index;
   {
     const torch::NoGradGuard no_grad;
-    const at::NoTF32Guard no_tf32;  // its distances do not tell near points apart
+    const at::NoTF32Guard no_tf32;  // its ten bits do not tell near points apart
     index = torch::cdist(from, to).argmin(2);
   }
   return to.gather(1, index.unsqueeze(2).expand({-1, -1, 3})) - from;

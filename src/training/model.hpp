@@ -53,8 +53,8 @@ class RigidModuleImpl : public torch::nn::Module {
  public:
   explicit RigidModuleImpl(Pairing pairing);
 
-  /// `target_feature` is computed where it is undefined, as in the first iteration, or changes with
-  /// the source's pose.
+  /// `target_feature` starts undefined for each target; it is computed in the first iteration, and
+  /// in all where it changes with the source's pose.
   Pose forward(const torch::Tensor& moved_source, const torch::Tensor& target,
                torch::Tensor& target_feature);
 

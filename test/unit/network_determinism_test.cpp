@@ -76,9 +76,15 @@ TEST_P(NetworkDeterminism, aTieOfNearestTargetsDoesNotDependOnTheirOrder) {
       0, 0, 1, -1,        //
       0, 0, 0, 0;
   const Points centre = Points::Zero(3, 1);
-  const Output straight = run(source_, target, centre);
-  const Output reversed = run(source_, target.rowwise().reverse(), centre);
-  EXPECT_EQ(reversed.displacements, straight.displacements);
+  for (const Pairing pairing : {Pairing::kNearest, Pairing::kOffsets}) {
+    pairing_ = pairing;
+    const Output straight = run(centre, target, centre);
+    const Output reversed = run(centre, target.rowwise().reverse(), centre);
+    EXPECT_EQ(reversed.transform, straight.transform);
+    EXPECT_EQ(reversed.displacements, straight.displacements);
+    const Output turned = run(target, centre, target);
+    EXPECT_EQ(run(target.rowwise().reverse(), centre, target).transform, turned.transform);
+  }
 }
 
 TEST_P(NetworkDeterminism, aPointsDisplacementDoesNotDependOnTheOtherQueries) {
