@@ -138,11 +138,16 @@ void Network::estimateDisplacements(const Points& source, const Points& target,
         "queries: with pairing row they must be the source's points, as many as the target's");
   }
   float* features = network.nonrigid_features.data();
-  network.nonrigid_source.encode(source, network.offsetsTo(target, network.to_target), features,
-                                 network.workspace);
-  network.nonrigid_target.encode(target, network.offsetsTo(source, network.to_source),
-                                 features + kFeatureSize, network.workspace);
-  network.nonrigid_decoder.decode(features, target, queries, displacements, network.workspace);
+  const NearestOffsets* to_target = network.offsetsTo(target, network.to_target);
+  const NearestOffsets* to_source = network.offsetsTo(source, network.to_source);
+  network.nonrigid_source.encode(source, to_target, features, network.workspace);
+  network.nonrigid_target.encode(target, to_source, features + kFeatureSize, network.workspace);
+  if (network.pairing == Pairing::kNearest) {  // the decoder alone reads them
+    network.to_target.setOthers(target);
+    to_target = &network.to_target;
+  }
+  network.nonrigid_decoder.decode(features, target, to_target, queries, displacements,
+                                  network.workspace);
 }
 
 const Eigen::VectorXf& Network::rigidFeatures() const { return implementation_->rigid_features; }

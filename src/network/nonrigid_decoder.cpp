@@ -7,10 +7,6 @@ namespace {
 constexpr int kLastLayer = static_cast<int>(kNonRigidDecoderWidths.size()) - 1;
 constexpr Eigen::Index kFeatureColumns = 2 * kFeatureSize;
 
-bool readsOffset(Pairing pairing) {
-  return pairing == Pairing::kNearest || pairing == Pairing::kOffsets;
-}
-
 const Layer& firstLayer(const Weights& weights) { return weights.layers.at("nonrigid.decoder.0"); }
 
 /// The columns of the point and, where there is one, its paired row; no bias.
@@ -34,19 +30,18 @@ NonRigidDecoder::NonRigidDecoder(const Kernels& kernels, const Weights& weights)
       layers_(packLayers(kernels, weights, "nonrigid.decoder", 1, kLastLayer, Activation::kNone)),
       feature_outputs_(feature_layer_.paddedOutputs()) {}
 
-void NonRigidDecoder::decode(const float* features, const Points& target, const Points& queries,
+void NonRigidDecoder::decode(const float* features, const Points& target,
+                             const NearestOffsets* to_target, const Points& queries,
                              Points& displacements, Workspace& workspace) {
   feature_layer_.applyToRow(features, feature_outputs_.data(), workspace);
-  if (readsOffset(pairing_)) {
-    to_target_.setOthers(target);
-  }
   displacements.resize(3, queries.cols());
 
   const Kernels& kernels = workspace.kernels();
   LayerView first = point_layer_.view();
   first.bias = feature_outputs_.data();
   workspace.forEachBlock(queries.cols(), [&](Scratch& scratch, long begin, long count) {
-    const RowsView inputs = pairedInputs(queries, begin, count, target, scratch, kernels);
+    const RowsView inputs =
+        pairedInputs(queries, begin, count, target, to_target, scratch, kernels);
     float* hidden = scratch.activations[0].data();
     kernels.dense(first, inputs, 0, first.panel_count, hidden, kBlockStride);
     const RowsView outputs = runLayers(kernels, layers_, {hidden, kBlockStride, count}, scratch);
@@ -58,10 +53,10 @@ void NonRigidDecoder::decode(const float* features, const Points& target, const 
 }
 
 RowsView NonRigidDecoder::pairedInputs(const Points& queries, long begin, long count,
-                                       const Points& target, Scratch& scratch,
-                                       const Kernels& kernels) const {
-  if (readsOffset(pairing_)) {
-    return to_target_.rows(queries, begin, count, scratch, kernels);
+                                       const Points& target, const NearestOffsets* to_target,
+                                       Scratch& scratch, const Kernels& kernels) const {
+  if (to_target != nullptr) {
+    return to_target->rows(queries, begin, count, scratch, kernels);
   }
   if (pairing_ == Pairing::kNone) {
     return {queries.data() + 3 * begin, 3, count};

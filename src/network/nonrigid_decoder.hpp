@@ -15,20 +15,21 @@ class NonRigidDecoder {
  public:
   NonRigidDecoder(const Kernels& kernels, const Weights& weights);
 
-  /// `features`: 2 x kFeatureSize; `displacements` gets the size of `queries`.
-  void decode(const float* features, const Points& target, const Points& queries,
-              Points& displacements, Workspace& workspace);
+  /// `features`: 2 x kFeatureSize; `to_target` is null where the pairing is none or row;
+  /// `displacements` gets the size of `queries`.
+  void decode(const float* features, const Points& target, const NearestOffsets* to_target,
+              const Points& queries, Points& displacements, Workspace& workspace);
 
  private:
   RowsView pairedInputs(const Points& queries, long begin, long count, const Points& target,
-                        Scratch& scratch, const Kernels& kernels) const;
+                        const NearestOffsets* to_target, Scratch& scratch,
+                        const Kernels& kernels) const;
 
   Pairing pairing_;
   DenseLayer point_layer_;          ///< the first layer's columns of the point and its paired row
   DenseLayer feature_layer_;        ///< its columns of the features
   std::vector<DenseLayer> layers_;  ///< those that follow
   AlignedFloats feature_outputs_;
-  NearestOffsets to_target_;
 };
 
 }  // namespace unirit

@@ -101,15 +101,15 @@ NonRigidModuleImpl::NonRigidModuleImpl(Pairing pairing)
 
 torch::Tensor NonRigidModuleImpl::forward(const torch::Tensor& moved_source,
                                           const torch::Tensor& target) {
+  const auto source_input = encoderInput(pairing_, moved_source, target);
   const auto features =
-      torch::cat({source_encoder_->forward(encoderInput(pairing_, moved_source, target)),
+      torch::cat({source_encoder_->forward(source_input),
                   target_encoder_->forward(encoderInput(pairing_, target, moved_source))},
                  1);
-  std::vector<torch::Tensor> local{moved_source};
-  if (pairing_ == Pairing::kRow) {
-    local.push_back(target);
-  } else if (pairing_ != Pairing::kNone) {
-    local.push_back(offsets(moved_source, target));
+  torch::Tensor local = source_input;  // what the decoder reads of each point
+  if (pairing_ == Pairing::kRow) local = torch::cat({moved_source, target}, 2);
+  if (pairing_ == Pairing::kNearest) {
+    local = torch::cat({moved_source, offsets(moved_source, target)}, 2);
   }
 
   // The first layer is linear: its global columns are multiplied once a pair, not once a point.
@@ -117,7 +117,7 @@ torch::Tensor NonRigidModuleImpl::forward(const torch::Tensor& moved_source,
   const auto columns = first->weight.split_with_sizes(
       {3, 2 * kFeatureSize, first->weight.size(1) - 3 - 2 * kFeatureSize}, 1);
   const auto global = torch::linear(features, columns[1], first->bias);
-  const auto point = torch::linear(torch::cat(local, 2), torch::cat({columns[0], columns[2]}, 1));
+  const auto point = torch::linear(local, torch::cat({columns[0], columns[2]}, 1));
   return decoder_->continueFrom(point + global.unsqueeze(1));
 }
 

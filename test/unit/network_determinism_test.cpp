@@ -78,12 +78,14 @@ TEST_P(NetworkDeterminism, aTieOfNearestTargetsDoesNotDependOnTheirOrder) {
   const Points centre = Points::Zero(3, 1);
   for (const Pairing pairing : {Pairing::kNearest, Pairing::kOffsets}) {
     pairing_ = pairing;
-    const Output straight = run(centre, target, centre);
-    const Output reversed = run(centre, target.rowwise().reverse(), centre);
-    EXPECT_EQ(reversed.transform, straight.transform);
-    EXPECT_EQ(reversed.displacements, straight.displacements);
-    const Output turned = run(target, centre, target);
-    EXPECT_EQ(run(target.rowwise().reverse(), centre, target).transform, turned.transform);
+    const Points reversed = target.rowwise().reverse();
+    for (const Points& source : {source_, centre}) {
+      const Output straight = run(source, target, centre);
+      const Output turned_round = run(source, reversed, centre);
+      EXPECT_EQ(turned_round.transform, straight.transform);
+      EXPECT_EQ(turned_round.displacements, straight.displacements);
+    }
+    EXPECT_EQ(run(reversed, centre, centre).transform, run(target, centre, centre).transform);
   }
 }
 
