@@ -15,8 +15,11 @@ void accumulate(float gradient, const float* from, float* row, std::int64_t size
 }
 
 /// Largest product of every channel over the points, and the point that holds it.
-void keepMaxima(const float* products, std::int64_t points, std::int64_t channels, float* maximum,
-                std::int32_t* index) {
+[[gnu::target_clones("avx512f", "avx2", "default")]] void keepMaxima(const float* products,
+                                                                     std::int64_t points,
+                                                                     std::int64_t channels,
+                                                                     float* maximum,
+                                                                     std::int32_t* index) {
   for (std::int64_t n = 0; n < points; ++n) {
     const float* product = products + n * channels;
     for (std::int64_t c = 0; c < channels; ++c) {

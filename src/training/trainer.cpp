@@ -45,46 +45,47 @@ int iterationsAt(const TrainingSettings& settings, std::int64_t step) {
   return std::min(settings.iterations, 1 + static_cast<int>(growth * settings.iterations));
 }
 
-/// The paper's L_total; every iteration of the rigid module learns on the detached output of the
-/// one before, so it has seen what it will be given.
-torch::Tensor totalLoss(Unirit& model, const Batch& batch, const TrainingSettings& settings,
-                        std::int64_t step) {
-  const double alpha = step < settings.rigid_steps ? 0.0 : settings.alpha;
-  const int iterations = iterationsAt(settings, step);
+struct Outcome {
+  torch::Tensor loss;
+  torch::Tensor moved;  // the source, by the rigid module's iteration, detached
+};
+
+/// One iteration of the rigid module from where batch.source stands and, where alpha is not zero,
+/// the non-rigid module after it: the paper's L_total.
+Outcome iterate(Unirit& model, const Batch& batch, Loss kind, double alpha) {
   torch::Tensor moved = batch.source;
-  torch::Tensor rigid_loss = torch::zeros({}, moved.options());
+  torch::Tensor loss = torch::zeros({}, moved.options());
   if (alpha < 1.0) {
     torch::Tensor target_feature;
-    for (int i = 0; i < iterations; ++i) {
-      moved =
-          model->rigid->forward(moved.detach(), batch.target, target_feature).apply(moved.detach());
-      rigid_loss = rigid_loss + distance(settings.loss, moved, batch.rigid, batch.target);
-    }
-    rigid_loss = rigid_loss / iterations;
+    moved = model->rigid->forward(moved, batch.target, target_feature).apply(moved);
+    loss = (1.0 - alpha) * distance(kind, moved, batch.rigid, batch.target);
+    moved = moved.detach();
   }
-  if (alpha == 0.0) return rigid_loss;
-  moved = moved.detach();
-  const auto deformed = moved + model->nonrigid->forward(moved, batch.target);
-  const auto global_loss = distance(settings.loss, deformed, batch.truth, batch.target);
-  return alpha * global_loss + (1.0 - alpha) * rigid_loss;
+  if (alpha > 0.0) {
+    const auto deformed = moved + model->nonrigid->forward(moved, batch.target);
+    loss = loss + alpha * distance(kind, deformed, batch.truth, batch.target);
+  }
+  return {loss, moved};
 }
 
-/// Sets the gradients of a step and returns its loss. On the CPU the batch is split over threads
-/// that each run forward and backward alone: small layers gain more from that than from threads
-/// inside every operation.
-torch::Tensor accumulateGradients(Unirit& model, const Batch& batch,
-                                  const TrainingSettings& settings, std::int64_t step) {
+/// Sets the gradients of one iteration, moves the batch's source by it and returns the loss. On
+/// the CPU the batch is split over threads that each run forward and backward alone: small layers
+/// gain more from that than from threads inside every operation.
+torch::Tensor accumulateGradients(Unirit& model, Batch& batch, const TrainingSettings& settings,
+                                  double alpha) {
   const auto parameters = model->parameters();
   const std::int64_t pairs = batch.source.size(0);
   const std::int64_t parts = std::min<std::int64_t>(settings.threads, pairs);
-  std::vector<torch::Tensor> losses(static_cast<std::size_t>(parts));
-  std::vector<torch::autograd::variable_list> gradients(static_cast<std::size_t>(parts));
+  std::vector<torch::Tensor> losses(static_cast<std::size_t>(parts)), moved(losses.size());
+  std::vector<torch::autograd::variable_list> gradients(losses.size());
   const auto work = [&](std::int64_t part) {
     const std::int64_t first = part * pairs / parts, last = (part + 1) * pairs / parts;
     const double share = static_cast<double>(last - first) / static_cast<double>(pairs);
-    const auto loss = share * totalLoss(model, slice(batch, first, last), settings, step);
+    const Outcome outcome = iterate(model, slice(batch, first, last), settings.loss, alpha);
+    const auto loss = share * outcome.loss;
     const auto slot = static_cast<std::size_t>(part);
     losses[slot] = loss.detach();
+    moved[slot] = outcome.moved;
     gradients[slot] = torch::autograd::grad({loss}, parameters, {}, {}, false, true);
   };
   std::vector<std::thread> threads;
@@ -92,18 +93,30 @@ torch::Tensor accumulateGradients(Unirit& model, const Batch& batch,
   work(0);
   for (std::thread& thread : threads) thread.join();
 
-  for (std::size_t part = 0; part < gradients.size(); ++part) {
-    for (std::size_t i = 0; i < parameters.size(); ++i) {
-      auto& gradient = gradients[part][i];
-      if (!gradient.defined()) continue;  // a module that does not train in this step
-      if (part == 0) {
-        parameters[i].mutable_grad() = gradient;
-      } else {
-        parameters[i].mutable_grad().add_(gradient);
-      }
-    }
+  for (std::size_t i = 0; i < parameters.size(); ++i) {
+    auto& sum = parameters[i].mutable_grad();
+    sum = gradients.front()[i];  // undefined where a module does not train now
+    if (!sum.defined()) continue;
+    for (std::size_t part = 1; part < gradients.size(); ++part) sum.add_(gradients[part][i]);
   }
+  batch.source = torch::cat(moved);
   return torch::stack(losses).sum();
+}
+
+/// Updates the weights after every iteration of the rigid module, each of which learns on the
+/// output of the one before, so has seen what it will be given; the non-rigid module learns with
+/// the last. Returns the mean loss.
+torch::Tensor learn(Unirit& model, torch::optim::Adam& optimiser, Batch batch,
+                    const TrainingSettings& settings, std::int64_t step) {
+  const double alpha = step < settings.rigid_steps ? 0.0 : settings.alpha;
+  const int iterations = alpha < 1.0 ? iterationsAt(settings, step) : 1;
+  torch::Tensor loss = torch::zeros({}, batch.source.options());
+  for (int i = 1; i <= iterations; ++i) {
+    loss += accumulateGradients(model, batch, settings, i < iterations ? 0.0 : alpha);
+    torch::nn::utils::clip_grad_norm_(model->parameters(), kLargestGradient);
+    optimiser.step();
+  }
+  return loss / iterations;
 }
 
 struct ValidationSet {
@@ -261,11 +274,10 @@ Unirit train(const std::vector<Organ>& organs, const std::vector<Organ>& validat
     for (auto& group : optimiser.param_groups()) {
       static_cast<torch::optim::AdamOptions&>(group.options()).lr(learningRate(settings, step));
     }
-    const Batch batch =
-        transformed(queue.next(), [&](const torch::Tensor& t) { return t.to(settings.device); });
-    loss_sum += accumulateGradients(model, batch, settings, step);
-    torch::nn::utils::clip_grad_norm_(model->parameters(), kLargestGradient);
-    optimiser.step();
+    loss_sum += learn(
+        model, optimiser,
+        transformed(queue.next(), [&](const torch::Tensor& t) { return t.to(settings.device); }),
+        settings, step);
     ++step;
 
     if (step % settings.report_every == 0 || step == settings.steps) {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Command line of the training: organs in, weights out.
+#include <malloc.h>
 #include <stdlib.h>
 #include <unistd.h>
 
@@ -7,6 +8,7 @@
 #include <algorithm>
 #include <cstdio>
 #include <iostream>
+#include <limits>
 #include <map>
 #include <thread>
 
@@ -52,6 +54,14 @@ void configureBlas(char** arguments) {
     setenv("OPENBLAS_CORETYPE", avx512 ? "SkylakeX" : "Haswell", 0);
   }
   execv("/proc/self/exe", arguments);  // returns only on failure; then training is merely slower
+}
+
+/// Every step asks for the tensors of the one before: what goes back to the kernel between them is
+/// cleared page by page again, a fifth of a step's time.
+void keepMemory() {
+  mallopt(M_MMAP_THRESHOLD, 32 << 20);
+  mallopt(M_TRIM_THRESHOLD, std::numeric_limits<int>::max());
+  mallopt(M_TOP_PAD, 64 << 20);
 }
 
 void addOptions(CLI::App& app, Options& options) {
@@ -264,6 +274,7 @@ void run(Options& options) {
 
 int main(int argc, char** argv) {
   configureBlas(argv);
+  keepMemory();
   CLI::App app{"Trains the UniRiT network and writes its weights as safetensors."};
   Options options;
   addOptions(app, options);
