@@ -13,7 +13,7 @@ torch::Tensor toTensor(const Points& points) {
 
 /// Largest difference between what the two networks make of the same pair.
 float disagreement(const LibtorchNetwork& other) {
-  Network network(weights(), {}, 1);
+  Network network(weights(Pairing::kNearest), {kRigidIterations, Pairing::kNearest}, 1);
   const Points moved = network.estimateRigid(source(), target()) * source();
   const Points displacements = network.estimateDisplacements(moved, target(), moved);
   const auto clouds = toTensor(target());
@@ -30,7 +30,7 @@ void libtorch_forward(benchmark::State& state) {
   const auto threads = static_cast<int>(state.range(0));
   torch::set_num_threads(threads);
   openblas_set_num_threads(threads);
-  const LibtorchNetwork network(*weights());
+  const LibtorchNetwork network(*weights(Pairing::kNearest));
   constexpr float kTolerance = 1e-4F;
   if (!(disagreement(network) < kTolerance)) {
     state.SkipWithError("LibTorch's output is not the network's");
@@ -42,7 +42,7 @@ void libtorch_forward(benchmark::State& state) {
     const auto moved = network.moveRigidly(source_tensor, target_tensor, kRigidIterations);
     benchmark::DoNotOptimize(network.estimateDisplacements(moved, target_tensor).data_ptr());
   }
-  setRate(state, forwardMultiplyAdds());
+  setRate(state, forwardMultiplyAdds(Pairing::kNearest));
 }
 
 BENCHMARK(libtorch_forward)->Arg(1)->Arg(2)->UseRealTime()->Unit(benchmark::kMillisecond);

@@ -77,7 +77,7 @@ RegistrationSettings settingsOf(const benchmark::State& state) {
 
 void registerClouds(benchmark::State& state, const PointCloud& preoperative,
                     const PointCloud& intraoperative, bool warm) {
-  Registrar registrar(weights(), settingsOf(state));
+  Registrar registrar(weights(NetworkSettings().pairing), settingsOf(state));
   const auto registerFrom = [&](const Eigen::Isometry3d& start, const Earlier* earlier) {
     return registrar.registerClouds(preoperative, intraoperative, start, earlier);
   };

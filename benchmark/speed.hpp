@@ -8,7 +8,7 @@
 #include "unirit/network/network.hpp"
 #include "unirit/random.hpp"
 
-/// What all measurements share: one pair of clouds of 1024 points, one set of weights.
+/// What all measurements share: one pair of clouds of 1024 points, one seed of weights.
 namespace unirit::speed {
 
 inline constexpr Eigen::Index kPoints = 1024;
@@ -31,9 +31,8 @@ inline const Points& target() {
 }
 
 /// Speed does not depend on the weights' values.
-inline const std::shared_ptr<const Weights>& weights() {
-  static const auto random = std::make_shared<const Weights>(randomWeights(Pairing::kNearest, 1));
-  return random;
+inline std::shared_ptr<const Weights> weights(Pairing pairing) {
+  return std::make_shared<const Weights>(randomWeights(pairing, 1));
 }
 
 inline int threadsOf(const benchmark::State& state) { return static_cast<int>(state.range(0)); }
@@ -44,8 +43,9 @@ inline void setRate(benchmark::State& state, double multiply_adds) {
       benchmark::Counter(2e-9 * multiply_adds, benchmark::Counter::kIsIterationInvariantRate);
 }
 
-inline double forwardMultiplyAdds() {
-  return multiplyAdds(kPoints, kPoints, kRigidIterations, Pairing::kNearest, true);
+/// Of the whole network.
+inline double forwardMultiplyAdds(Pairing pairing) {
+  return multiplyAdds(kPoints, kPoints, kRigidIterations, pairing, true);
 }
 
 }  // namespace unirit::speed

@@ -13,20 +13,24 @@ namespace unirit::speed {
 namespace {
 
 /// The whole network: 8 rigid iterations, then the displacement of each of the 1024 points.
-void unirit_forward(benchmark::State& state) {
-  Network network(weights(), {}, threadsOf(state));
+void measureForward(benchmark::State& state, Pairing pairing) {
+  Network network(weights(pairing), {kRigidIterations, pairing}, threadsOf(state));
   Points displacements;
   for (auto _ : state) {
     benchmark::DoNotOptimize(network.estimateRigid(source(), target()));
     network.estimateDisplacements(source(), target(), source(), displacements);
   }
   state.SetLabel(toString(selectKernels().instruction_set));
-  setRate(state, forwardMultiplyAdds());
+  setRate(state, forwardMultiplyAdds(pairing));
 }
+
+/// Of the published layers, and of those the node runs.
+void unirit_forward(benchmark::State& state) { measureForward(state, Pairing::kNearest); }
+void unirit_forward_offsets(benchmark::State& state) { measureForward(state, Pairing::kOffsets); }
 
 /// The displacement of every vertex of an organ of 20,000, features included.
 void unirit_vertices(benchmark::State& state) {
-  Network network(weights(), {}, threadsOf(state));
+  Network network(weights(NetworkSettings().pairing), {}, threadsOf(state));
   const Points vertices = randomPoints(kVertices, 3);
   Points displacements;
   for (auto _ : state) {
@@ -53,6 +57,7 @@ void openblas_gemm(benchmark::State& state) {
 
 BENCHMARK(openblas_gemm)->Arg(1)->Arg(2)->UseRealTime()->Unit(benchmark::kMillisecond);
 BENCHMARK(unirit_forward)->Arg(1)->Arg(2)->UseRealTime()->Unit(benchmark::kMillisecond);
+BENCHMARK(unirit_forward_offsets)->Arg(1)->Arg(2)->UseRealTime()->Unit(benchmark::kMillisecond);
 BENCHMARK(unirit_vertices)->Arg(1)->Arg(2)->UseRealTime()->Unit(benchmark::kMillisecond);
 
 /// OpenBLAS 0.3.21 takes processors newer than itself for very old ones, which would flatter the

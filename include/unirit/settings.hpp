@@ -7,14 +7,14 @@
 namespace unirit {
 
 /// What of the other cloud the network reads beside a point: in the non-rigid decoder, where the
-/// published network reads the target's row, and in one case in the encoders too. Checkpoints hold
-/// the number: new ones come last.
+/// published network reads the target's row, and in one case in encoders too. Checkpoints hold the
+/// number: new ones come last.
 enum class Pairing {
   kNearest,  ///< offset to the nearest target point: independent of the order of either cloud
   kNone,     ///< nothing, as in the Free Point Transformer
   kRow,      ///< row i of the target, as published; only to reproduce the published tables
-  kOffsets,  ///< as nearest, and in every encoder the offset to the nearest point of the other
-             ///< cloud
+  kOffsets,  ///< as nearest, and in the encoders of the non-rigid module and of a second, fine
+             ///< rigid module the offset to the nearest point of the other cloud
 };
 
 /// The stages of a registration, in their order.
@@ -40,7 +40,7 @@ struct SamplingSettings {
 
 /// How the network is run.
 struct NetworkSettings {
-  int rigid_iterations = 8;             ///< n of the paper's rigid module
+  int rigid_iterations = 8;             ///< n of the paper's rigid module, the fine one's included
   Pairing pairing = Pairing::kNearest;  ///< must be the one the weights were trained with
 };
 

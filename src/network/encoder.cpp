@@ -8,17 +8,21 @@ namespace {
 
 constexpr int kLastLayer = static_cast<int>(kEncoderWidths.size()) - 1;
 
+const Layer& lastLayer(const Weights& weights, const std::string& name) {
+  return weights.layers.at(name + "." + std::to_string(kLastLayer));
+}
+
 }  // namespace
 
 Encoder::Encoder(const Kernels& kernels, const Weights& weights, const std::string& name)
-    : layers_(packLayers(kernels, weights, name, 0, kLastLayer - 1, Activation::kRelu)),
-      last_(kernels, weights.layers.at(name + "." + std::to_string(kLastLayer)),
-            Activation::kRelu) {}
+    : feature_size_(static_cast<int>(lastLayer(weights, name).bias.size())),
+      layers_(packLayers(kernels, weights, name, 0, kLastLayer - 1, Activation::kRelu)),
+      last_(kernels, lastLayer(weights, name), Activation::kRelu) {}
 
 void Encoder::encode(const Points& points, const NearestOffsets* offsets, float* feature,
                      Workspace& workspace) const {
   for (Scratch& scratch : workspace.scratches()) {
-    std::fill_n(scratch.maxima.data(), kFeatureSize, 0.0F);
+    std::fill_n(scratch.maxima.data(), feature_size_, 0.0F);
   }
   const Kernels& kernels = workspace.kernels();
   workspace.forEachBlock(points.cols(), [&](Scratch& scratch, long begin, long count) {
@@ -28,9 +32,9 @@ void Encoder::encode(const Points& points, const NearestOffsets* offsets, float*
     kernels.denseMaximum(last_.view(), runLayers(kernels, layers_, input, scratch),
                          scratch.maxima.data());
   });
-  std::fill_n(feature, kFeatureSize, 0.0F);
+  std::fill_n(feature, feature_size_, 0.0F);
   for (const Scratch& scratch : workspace.scratches()) {
-    std::transform(feature, feature + kFeatureSize, scratch.maxima.data(), feature,
+    std::transform(feature, feature + feature_size_, scratch.maxima.data(), feature,
                    [](float a, float b) { return std::max(a, b); });
   }
 }

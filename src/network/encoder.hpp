@@ -15,13 +15,16 @@ class Encoder {
  public:
   Encoder(const Kernels& kernels, const Weights& weights, const std::string& name);
 
-  /// Writes the kFeatureSize numbers of the cloud's feature. `offsets`, to the other cloud, are
-  /// given where the pairing is offsets, else null. The last layer's outputs are never stored: each
+  /// Writes the featureSize() numbers of the cloud's feature. `offsets`, to the other cloud, are
+  /// given where the encoder reads them, else null. The last layer's outputs are never stored: each
   /// block of points only raises the maxima, which a ReLU starts at zero.
   void encode(const Points& points, const NearestOffsets* offsets, float* feature,
               Workspace& workspace) const;
 
+  int featureSize() const { return feature_size_; }
+
  private:
+  int feature_size_;
   std::vector<DenseLayer> layers_;  ///< all but the last
   DenseLayer last_;
 };

@@ -21,17 +21,18 @@ double multiplyAdds(Eigen::Index source_points, Eigen::Index target_points, int 
                     Pairing pairing, bool with_savings) {
   const auto sources = static_cast<double>(source_points);
   const auto targets = static_cast<double>(target_points);
-  const double encoder = multiplyAddsPerRow(encoderInputs(pairing), kEncoderWidths);
-  // what the target's points read changes with the source's pose where they read the way to it
-  const int target_encodings = pairing == Pairing::kOffsets ? rigid_iterations : 1;
-  const double rigid = encoder * (rigid_iterations * sources + target_encodings * targets) +
-                       rigid_iterations * multiplyAddsPerRow(2 * kFeatureSize, kRigidDecoderWidths);
+  const int coarse = coarseIterations(pairing, rigid_iterations);
+  const double rigid = multiplyAddsPerRow(3, kEncoderWidths) * (coarse * sources + targets) +
+                       coarse * multiplyAddsPerRow(2 * kFeatureSize, kRigidDecoderWidths);
+  const double fine = multiplyAddsPerRow(kOffsetInputs, kFineEncoderWidths) * (sources + targets) +
+                      multiplyAddsPerRow(2 * kFineEncoderWidths.back(), kFineDecoderWidths);
 
   constexpr double kFeatureColumns = 2.0 * kFeatureSize * kNonRigidDecoderWidths.front();
   const double decoder = multiplyAddsPerRow(nonRigidDecoderInputs(pairing), kNonRigidDecoderWidths);
+  const double encoder = multiplyAddsPerRow(nonRigidEncoderInputs(pairing), kEncoderWidths);
   const double nonrigid = encoder * (sources + targets) + sources * (decoder - kFeatureColumns) +
                           (with_savings ? 1.0 : sources) * kFeatureColumns;
-  return rigid + nonrigid;
+  return rigid + (rigid_iterations - coarse) * fine + nonrigid;
 }
 
 }  // namespace unirit

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "unirit/network/network.hpp"
 
+#include <optional>
 #include <stdexcept>
 #include <string>
 
@@ -35,6 +36,19 @@ void requireFit(const std::shared_ptr<const Weights>& weights, const NetworkSett
   validate(*weights);
 }
 
+/// Encoders, decoder and their features.
+struct RigidModule {
+  RigidModule(const Kernels& kernels, const Weights& weights, const std::string& name, int layers)
+      : source(kernels, weights, name + ".source_encoder"),
+        target(kernels, weights, name + ".target_encoder"),
+        decoder(kernels, weights, name + ".decoder", layers),
+        features(Eigen::VectorXf::Zero(source.featureSize() + target.featureSize())) {}
+
+  Encoder source, target;
+  RigidDecoder decoder;
+  Eigen::VectorXf features;
+};
+
 }  // namespace
 
 struct Network::Implementation {
@@ -43,7 +57,14 @@ struct Network::Implementation {
       : weights(std::move(shared_weights)),
         pairing(settings.pairing),
         rigid_iterations(settings.rigid_iterations),
-        workspace(selectKernels(), threads) {}
+        workspace(selectKernels(), threads) {
+    if (pairing != Pairing::kOffsets) return;
+    fine.emplace(workspace.kernels(), *weights, "fine",
+                 static_cast<int>(kFineDecoderWidths.size()));
+  }
+
+  RigidStep coarseStep(const Points& target, bool first);
+  RigidStep fineStep(const Points& target);
 
   /// To the nearest of `others`; null where the encoders do not read them.
   const NearestOffsets* offsetsTo(const Points& others, NearestOffsets& offsets) const {
@@ -56,18 +77,35 @@ struct Network::Implementation {
   Pairing pairing;
   int rigid_iterations;
   Workspace workspace;
-  Encoder rigid_source{workspace.kernels(), *weights, "rigid.source_encoder"};
-  Encoder rigid_target{workspace.kernels(), *weights, "rigid.target_encoder"};
-  RigidDecoder rigid_decoder{workspace.kernels(), *weights};
+  RigidModule rigid{workspace.kernels(), *weights, "rigid",
+                    static_cast<int>(kRigidDecoderWidths.size())};
+  std::optional<RigidModule> fine;  // with pairing offsets
   Encoder nonrigid_source{workspace.kernels(), *weights, "nonrigid.source_encoder"};
   Encoder nonrigid_target{workspace.kernels(), *weights, "nonrigid.target_encoder"};
   NonRigidDecoder nonrigid_decoder{workspace.kernels(), *weights};
-  Eigen::VectorXf rigid_features = Eigen::VectorXf::Zero(2 * kFeatureSize);
   Eigen::VectorXf nonrigid_features = Eigen::VectorXf::Zero(2 * kFeatureSize);
   NearestOffsets to_source;
   NearestOffsets to_target;
   Points moved;
 };
+
+/// From where `moved` stands. The target's feature stands still.
+RigidStep Network::Implementation::coarseStep(const Points& target, bool first) {
+  float* features = rigid.features.data();
+  rigid.source.encode(moved, nullptr, features, workspace);
+  if (first) rigid.target.encode(target, nullptr, features + kFeatureSize, workspace);
+  return rigid.decoder.decode(features, workspace);
+}
+
+/// The same of the fine module, for which to_target is set; the target's points read the way to
+/// where the source has come.
+RigidStep Network::Implementation::fineStep(const Points& target) {
+  float* features = fine->features.data();
+  to_source.setOthers(moved);
+  fine->source.encode(moved, &to_target, features, workspace);
+  fine->target.encode(target, &to_source, features + fine->source.featureSize(), workspace);
+  return fine->decoder.decode(features, workspace);
+}
 
 Network::Network(std::shared_ptr<const Weights> weights, const NetworkSettings& settings,
                  int threads) {
@@ -84,20 +122,14 @@ Eigen::Isometry3f Network::estimateRigid(const Points& source, const Points& tar
   requireCloud(source, "source");
   requireCloud(target, "target");
   auto& network = *implementation_;
-  float* features = network.rigid_features.data();
-
-  const NearestOffsets* to_target = network.offsetsTo(target, network.to_target);
+  const int coarse = coarseIterations(network.pairing, network.rigid_iterations);
+  network.offsetsTo(target, network.to_target);
   network.moved = source;
   Eigen::Quaternionf rotation = Eigen::Quaternionf::Identity();
   Eigen::Isometry3f transform = Eigen::Isometry3f::Identity();
   for (int i = 0; i < network.rigid_iterations; ++i) {
-    const NearestOffsets* to_source = network.offsetsTo(network.moved, network.to_source);
-    network.rigid_source.encode(network.moved, to_target, features, network.workspace);
-    // Unless it reads the way to the source, the target's feature stands still
-    if (i == 0 || to_source != nullptr) {
-      network.rigid_target.encode(target, to_source, features + kFeatureSize, network.workspace);
-    }
-    const RigidStep step = network.rigid_decoder.decode(features, network.workspace);
+    const RigidStep step =
+        i < coarse ? network.coarseStep(target, i == 0) : network.fineStep(target);
 
     // Apply the step
     const Eigen::Matrix3f step_rotation = step.rotation.toRotationMatrix();
@@ -150,7 +182,7 @@ void Network::estimateDisplacements(const Points& source, const Points& target,
                                   network.workspace);
 }
 
-const Eigen::VectorXf& Network::rigidFeatures() const { return implementation_->rigid_features; }
+const Eigen::VectorXf& Network::rigidFeatures() const { return implementation_->rigid.features; }
 
 const Eigen::VectorXf& Network::nonRigidFeatures() const {
   return implementation_->nonrigid_features;

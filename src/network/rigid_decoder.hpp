@@ -17,10 +17,11 @@ struct RigidStep {
 /// Reads a step off the features of the moved source and the target.
 class RigidDecoder {
  public:
-  RigidDecoder(const Kernels& kernels, const Weights& weights);
+  /// Of `layers` layers, NAME.0 and on.
+  RigidDecoder(const Kernels& kernels, const Weights& weights, const std::string& name, int layers);
 
-  /// `features`: 2 x kFeatureSize. Throws std::runtime_error where the quaternion cannot be
-  /// normalised.
+  /// `features`: of the source, then of the target. Throws std::runtime_error where the quaternion
+  /// cannot be normalised.
   RigidStep decode(const float* features, Workspace& workspace);
 
  private:

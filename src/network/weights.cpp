@@ -213,19 +213,24 @@ void writeWeights(const Weights& weights, const std::string& path) {
 
 Weights randomWeights(Pairing pairing, unsigned seed) {
   constexpr double kLastLayerScale = 0.05;
+  constexpr float kOffsetScale = 10.0F;  // offsets are shorter than points by as much
   Random random(seed);
   Weights weights;
   weights.pairing = pairing;
   for (const LayerShape& shape : layerShapes(pairing)) {
-    const bool last = shape.name == "rigid.decoder.5" || shape.name == "nonrigid.decoder.5";
+    const bool last = shape.outputs == kRigidDecoderWidths.back() ||
+                      shape.outputs == kNonRigidDecoderWidths.back();
     const double deviation = std::sqrt(2.0 / shape.inputs) * (last ? kLastLayerScale : 1.0);
     Layer& layer = weights.layers[shape.name];
     layer.weight = Eigen::MatrixXf::NullaryExpr(shape.outputs, shape.inputs, [&] {
       return static_cast<float>(deviation * random.normal());
     });
+    if (shape.inputs == kOffsetInputs) layer.weight.rightCols(3) *= kOffsetScale;
     layer.bias = Eigen::VectorXf::Zero(shape.outputs);
   }
-  weights.layers["rigid.decoder.5"].bias[0] = 1.0F;
+  for (auto& [name, layer] : weights.layers) {
+    if (layer.bias.size() == kRigidDecoderWidths.back()) layer.bias[0] = 1.0F;
+  }
   return weights;
 }
 

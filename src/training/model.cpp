@@ -16,11 +16,9 @@ std::vector<int> stack(int inputs, const std::array<int, Size>& outputs) {
   return widths;
 }
 
-/// What an encoder reads of `points` beside the other cloud: [B, N, encoderInputs(pairing)].
-torch::Tensor encoderInput(Pairing pairing, const torch::Tensor& points,
-                           const torch::Tensor& other) {
-  if (pairing != Pairing::kOffsets) return points;
-  return torch::cat({points, offsets(points, other)}, 2);
+/// What an encoder of so many inputs reads of `points` beside the other cloud: [B, N, inputs].
+torch::Tensor encoderInput(int inputs, const torch::Tensor& points, const torch::Tensor& other) {
+  return inputs == 3 ? points : torch::cat({points, offsets(points, other)}, 2);
 }
 
 /// Unit quaternions w x y z, [B, 4], to rotations, [B, 3, 3].
@@ -57,8 +55,7 @@ torch::Tensor PerceptronImpl::continueFrom(torch::Tensor first_output) {
   return linear_end_ ? values : torch::relu(values);
 }
 
-EncoderImpl::EncoderImpl(Pairing pairing)
-    : PerceptronImpl(stack(encoderInputs(pairing), kEncoderWidths), false) {}
+EncoderImpl::EncoderImpl(const std::vector<int>& widths) : PerceptronImpl(widths, false) {}
 
 torch::Tensor EncoderImpl::forward(torch::Tensor points) {
   torch::Tensor values = std::move(points);
@@ -73,38 +70,40 @@ torch::Tensor Pose::apply(const torch::Tensor& points) const {
   return torch::baddbmm(translation.unsqueeze(1), points, rotation.transpose(1, 2));
 }
 
-RigidModuleImpl::RigidModuleImpl(Pairing pairing)
-    : pairing_(pairing),
-      source_encoder_(register_module("source_encoder", Encoder(pairing))),
-      target_encoder_(register_module("target_encoder", Encoder(pairing))),
-      decoder_(register_module("decoder",
-                               Perceptron(stack(2 * kFeatureSize, kRigidDecoderWidths), true))) {}
+RigidModuleImpl::RigidModuleImpl(const std::vector<int>& encoder, const std::vector<int>& decoder)
+    : inputs_(encoder.front()),
+      source_encoder_(register_module("source_encoder", Encoder(encoder))),
+      target_encoder_(register_module("target_encoder", Encoder(encoder))),
+      decoder_(register_module("decoder", Perceptron(decoder, true))) {}
 
 Pose RigidModuleImpl::forward(const torch::Tensor& moved_source, const torch::Tensor& target,
                               torch::Tensor& target_feature) {
-  if (!target_feature.defined() || pairing_ == Pairing::kOffsets) {
-    target_feature = target_encoder_->forward(encoderInput(pairing_, target, moved_source));
+  if (!target_feature.defined() || inputs_ == kOffsetInputs) {
+    target_feature = target_encoder_->forward(encoderInput(inputs_, target, moved_source));
   }
-  const auto source_feature =
-      source_encoder_->forward(encoderInput(pairing_, moved_source, target));
+  const auto source_feature = source_encoder_->forward(encoderInput(inputs_, moved_source, target));
   const auto output = decoder_->forward(torch::cat({source_feature, target_feature}, 1));
   return {rotationOf(output.slice(1, 0, 4)), output.slice(1, 4, 7)};
 }
 
 NonRigidModuleImpl::NonRigidModuleImpl(Pairing pairing)
     : pairing_(pairing),
-      source_encoder_(register_module("source_encoder", Encoder(pairing))),
-      target_encoder_(register_module("target_encoder", Encoder(pairing))),
+      source_encoder_(register_module(
+          "source_encoder", Encoder(stack(nonRigidEncoderInputs(pairing), kEncoderWidths)))),
+      target_encoder_(register_module(
+          "target_encoder", Encoder(stack(nonRigidEncoderInputs(pairing), kEncoderWidths)))),
       decoder_(register_module(
           "decoder",
           Perceptron(stack(nonRigidDecoderInputs(pairing), kNonRigidDecoderWidths), true))) {}
 
 torch::Tensor NonRigidModuleImpl::forward(const torch::Tensor& moved_source,
-                                          const torch::Tensor& target) {
-  const auto source_input = encoderInput(pairing_, moved_source, target);
+                                          const torch::Tensor& target,
+                                          c10::optional<std::int64_t> points) {
+  const int inputs = nonRigidEncoderInputs(pairing_);
+  const auto source_input = encoderInput(inputs, moved_source, target);
   const auto features =
       torch::cat({source_encoder_->forward(source_input),
-                  target_encoder_->forward(encoderInput(pairing_, target, moved_source))},
+                  target_encoder_->forward(encoderInput(inputs, target, moved_source))},
                  1);
   torch::Tensor local = source_input;  // what the decoder reads of each point
   if (pairing_ == Pairing::kRow) local = torch::cat({moved_source, target}, 2);
@@ -117,14 +116,32 @@ torch::Tensor NonRigidModuleImpl::forward(const torch::Tensor& moved_source,
   const auto columns = first->weight.split_with_sizes(
       {3, 2 * kFeatureSize, first->weight.size(1) - 3 - 2 * kFeatureSize}, 1);
   const auto global = torch::linear(features, columns[1], first->bias);
-  const auto point = torch::linear(local, torch::cat({columns[0], columns[2]}, 1));
+  const auto point =
+      torch::linear(local.slice(1, 0, points), torch::cat({columns[0], columns[2]}, 1));
   return decoder_->continueFrom(point + global.unsqueeze(1));
 }
 
 UniritImpl::UniritImpl(Pairing pairing)
-    : rigid(register_module("rigid", RigidModule(pairing))),
+    : rigid(register_module("rigid", RigidModule(stack(3, kEncoderWidths),
+                                                 stack(2 * kFeatureSize, kRigidDecoderWidths)))),
       nonrigid(register_module("nonrigid", NonRigidModule(pairing))),
-      pairing_(pairing) {}
+      pairing_(pairing) {
+  if (pairing != Pairing::kOffsets) return;
+  fine = register_module("fine",
+                         RigidModule(stack(kOffsetInputs, kFineEncoderWidths),
+                                     stack(2 * kFineEncoderWidths.back(), kFineDecoderWidths)));
+}
+
+torch::Tensor UniritImpl::moveRigidly(const torch::Tensor& source, const torch::Tensor& target,
+                                      int iterations) {
+  const int coarse = coarseIterations(pairing_, iterations);
+  torch::Tensor moved = source, target_feature;
+  for (int i = 0; i < iterations; ++i) {
+    auto& module = i < coarse ? rigid : fine;
+    moved = module->forward(moved, target, target_feature).apply(moved);
+  }
+  return moved;
+}
 
 void UniritImpl::setWeights(const Weights& weights) {
   const bool widened = weights.pairing == Pairing::kNearest && pairing_ == Pairing::kOffsets;

@@ -30,12 +30,12 @@ class PerceptronImpl : public torch::nn::Module {
 };
 TORCH_MODULE(Perceptron);
 
-/// Shared perceptron over points, then the maximum: [B, N, encoderInputs(pairing)] -> [B, 1024]. On
-/// the CPU the gradient of the last layer is taken only through the points that hold a maximum,
+/// Shared perceptron over points, then the maximum: [B, N, inputs] -> [B, feature size]. On the CPU
+/// the gradient of the last layer is taken only through the points that hold a maximum,
 /// which is exact.
 class EncoderImpl : public PerceptronImpl {
  public:
-  explicit EncoderImpl(Pairing pairing);
+  explicit EncoderImpl(const std::vector<int>& widths);
   torch::Tensor forward(torch::Tensor points);
 };
 TORCH_MODULE(Encoder);
@@ -48,10 +48,11 @@ struct Pose {
   torch::Tensor apply(const torch::Tensor& points) const;  ///< [B, N, 3] -> [B, N, 3]
 };
 
-/// One iteration of the paper's rigid module.
+/// One iteration of the paper's rigid module, or of the fine one. Encoders of six inputs read the
+/// way to the other cloud beside each point.
 class RigidModuleImpl : public torch::nn::Module {
  public:
-  explicit RigidModuleImpl(Pairing pairing);
+  RigidModuleImpl(const std::vector<int>& encoder, const std::vector<int>& decoder);
 
   /// `target_feature` starts undefined for each target; it is computed in the first iteration, and
   /// in all where it changes with the source's pose.
@@ -59,17 +60,19 @@ class RigidModuleImpl : public torch::nn::Module {
                torch::Tensor& target_feature);
 
  private:
-  Pairing pairing_;
+  int inputs_;  // of the encoders
   Encoder source_encoder_, target_encoder_;
   Perceptron decoder_;
 };
 TORCH_MODULE(RigidModule);
 
-/// The non-rigid module: displacement of every point of the rigidly moved source.
+/// The non-rigid module: displacement of the first `points` of the rigidly moved source, [B, P, 3],
+/// of all without a number.
 class NonRigidModuleImpl : public torch::nn::Module {
  public:
   explicit NonRigidModuleImpl(Pairing pairing);
-  torch::Tensor forward(const torch::Tensor& moved_source, const torch::Tensor& target);
+  torch::Tensor forward(const torch::Tensor& moved_source, const torch::Tensor& target,
+                        c10::optional<std::int64_t> points = c10::nullopt);
 
  private:
   Pairing pairing_;
@@ -84,11 +87,16 @@ class UniritImpl : public torch::nn::Module {
   explicit UniritImpl(Pairing pairing);
 
   RigidModule rigid;
+  RigidModule fine{nullptr};  ///< with pairing offsets alone
   NonRigidModule nonrigid;
 
+  /// The source after so many iterations of the rigid modules.
+  torch::Tensor moveRigidly(const torch::Tensor& source, const torch::Tensor& target,
+                            int iterations);
+
   /// Replaces every parameter; throws std::invalid_argument where the pairing is another or a layer
-  /// is missing. Weights of pairing nearest serve pairing offsets, too: what the encoders read
-  /// beside a point then counts for nothing until it is trained.
+  /// is missing. Weights of pairing nearest serve pairing offsets, too: the fine module keeps its
+  /// own, and what the other encoders read beside a point counts for nothing until it is trained.
   void setWeights(const Weights& weights);
 
   /// The parameters as a weights file holds them, without metadata.

@@ -40,83 +40,106 @@ Batch slice(const Batch& batch, std::int64_t first, std::int64_t last) {
   return transformed(batch, [&](const torch::Tensor& t) { return t.slice(0, first, last); });
 }
 
-int iterationsAt(const TrainingSettings& settings, std::int64_t step) {
+/// Of a rigid module: grows from one to `iterations`.
+int iterationsAt(int iterations, const TrainingSettings& settings, std::int64_t step) {
   const double growth = static_cast<double>(step) / (kGrowthShare * settings.steps);
-  return std::min(settings.iterations, 1 + static_cast<int>(growth * settings.iterations));
+  return std::min(iterations, 1 + static_cast<int>(growth * iterations));
 }
+
+enum class Module { kRigid, kFine, kNonRigid };
 
 struct Outcome {
   torch::Tensor loss;
-  torch::Tensor moved;  // the source, by the rigid module's iteration, detached
+  torch::Tensor moved;  // the source, detached
 };
 
-/// One iteration of the rigid module from where batch.source stands and, where alpha is not zero,
-/// the non-rigid module after it: the paper's L_total.
-Outcome iterate(Unirit& model, const Batch& batch, Loss kind, double alpha) {
-  torch::Tensor moved = batch.source;
-  torch::Tensor loss = torch::zeros({}, moved.options());
-  if (alpha < 1.0) {
+/// One pass of a module from where batch.source stands, and its loss. That of the non-rigid module
+/// is taken at some points of each pair: its decoder is most of the work.
+Outcome pass(Unirit& model, const Batch& batch, const TrainingSettings& settings, Module module) {
+  if (module != Module::kNonRigid) {
+    auto& rigid = module == Module::kRigid ? model->rigid : model->fine;
     torch::Tensor target_feature;
-    moved = model->rigid->forward(moved, batch.target, target_feature).apply(moved);
-    loss = (1.0 - alpha) * distance(kind, moved, batch.rigid, batch.target);
-    moved = moved.detach();
+    const auto moved =
+        rigid->forward(batch.source, batch.target, target_feature).apply(batch.source);
+    return {distance(settings.loss, moved, batch.rigid, batch.target), moved.detach()};
   }
-  if (alpha > 0.0) {
-    const auto deformed = moved + model->nonrigid->forward(moved, batch.target);
-    loss = loss + alpha * distance(kind, deformed, batch.truth, batch.target);
-  }
-  return {loss, moved};
+  const std::int64_t points = std::min(settings.decoded_points, batch.source.size(1));
+  const auto moved = batch.source.slice(1, 0, points) +
+                     model->nonrigid->forward(batch.source, batch.target, points);
+  return {distance(settings.loss, moved, batch.truth.slice(1, 0, points), batch.target),
+          moved.detach()};
 }
 
-/// Sets the gradients of one iteration, moves the batch's source by it and returns the loss. On
-/// the CPU the batch is split over threads that each run forward and backward alone: small layers
-/// gain more from that than from threads inside every operation.
-torch::Tensor accumulateGradients(Unirit& model, Batch& batch, const TrainingSettings& settings,
-                                  double alpha) {
+/// Calls `work` with the number, first and last pair of each part of a batch, at once. On the CPU
+/// every thread runs forward and backward alone: small layers gain more from that than from threads
+/// inside every operation.
+template <class Work>
+void forEachPart(std::int64_t pairs, std::int64_t parts, const Work& work) {
+  std::vector<std::thread> threads;
+  for (std::int64_t part = 1; part < parts; ++part) {
+    threads.emplace_back(work, part, part * pairs / parts, (part + 1) * pairs / parts);
+  }
+  work(0, 0, pairs / parts);
+  for (std::thread& thread : threads) thread.join();
+}
+
+/// Updates a module's weights, unless they are kept, by one pass over the batch, moves the batch's
+/// source by it where it moves all of it, and returns the loss.
+torch::Tensor update(Unirit& model, torch::optim::Adam& optimiser, Batch& batch,
+                     const TrainingSettings& settings, Module module) {
+  const bool keeps = module == Module::kRigid && settings.keep_rigid;
   const auto parameters = model->parameters();
   const std::int64_t pairs = batch.source.size(0);
   const std::int64_t parts = std::min<std::int64_t>(settings.threads, pairs);
   std::vector<torch::Tensor> losses(static_cast<std::size_t>(parts)), moved(losses.size());
   std::vector<torch::autograd::variable_list> gradients(losses.size());
-  const auto work = [&](std::int64_t part) {
-    const std::int64_t first = part * pairs / parts, last = (part + 1) * pairs / parts;
+  forEachPart(pairs, parts, [&](std::int64_t part, std::int64_t first, std::int64_t last) {
+    const torch::AutoGradMode with_gradients(!keeps);
     const double share = static_cast<double>(last - first) / static_cast<double>(pairs);
-    const Outcome outcome = iterate(model, slice(batch, first, last), settings.loss, alpha);
+    const Outcome outcome = pass(model, slice(batch, first, last), settings, module);
     const auto loss = share * outcome.loss;
     const auto slot = static_cast<std::size_t>(part);
     losses[slot] = loss.detach();
     moved[slot] = outcome.moved;
-    gradients[slot] = torch::autograd::grad({loss}, parameters, {}, {}, false, true);
-  };
-  std::vector<std::thread> threads;
-  for (std::int64_t part = 1; part < parts; ++part) threads.emplace_back(work, part);
-  work(0);
-  for (std::thread& thread : threads) thread.join();
+    if (!keeps) gradients[slot] = torch::autograd::grad({loss}, parameters, {}, {}, false, true);
+  });
+  if (module != Module::kNonRigid) batch.source = torch::cat(moved);
+  const auto loss = torch::stack(losses).sum();
+  if (keeps) return loss;
 
   for (std::size_t i = 0; i < parameters.size(); ++i) {
     auto& sum = parameters[i].mutable_grad();
-    sum = gradients.front()[i];  // undefined where a module does not train now
+    sum = gradients.front()[i];  // undefined in the other modules: left as they are
     if (!sum.defined()) continue;
     for (std::size_t part = 1; part < gradients.size(); ++part) sum.add_(gradients[part][i]);
   }
-  batch.source = torch::cat(moved);
-  return torch::stack(losses).sum();
+  torch::nn::utils::clip_grad_norm_(parameters, kLargestGradient);
+  optimiser.step();
+  return loss;
 }
 
-/// Updates the weights after every iteration of the rigid module, each of which learns on the
-/// output of the one before, so has seen what it will be given; the non-rigid module learns with
-/// the last. Returns the mean loss.
+/// One step: an update for every iteration of the rigid modules, each on the output of the one
+/// before, so that it has seen what it will be given, then one of the non-rigid module. They share
+/// no weights and what passes between them is detached: these are the gradients of the paper's
+/// L_total, which is returned. A rigid module that is kept is passed over in some of the steps:
+/// from its outputs alone the fine one does not begin to learn.
 torch::Tensor learn(Unirit& model, torch::optim::Adam& optimiser, Batch batch,
                     const TrainingSettings& settings, std::int64_t step) {
   const double alpha = step < settings.rigid_steps ? 0.0 : settings.alpha;
-  const int iterations = alpha < 1.0 ? iterationsAt(settings, step) : 1;
   torch::Tensor loss = torch::zeros({}, batch.source.options());
-  for (int i = 1; i <= iterations; ++i) {
-    loss += accumulateGradients(model, batch, settings, i < iterations ? 0.0 : alpha);
-    torch::nn::utils::clip_grad_norm_(model->parameters(), kLargestGradient);
-    optimiser.step();
+  if (alpha < 1.0) {
+    const int all = coarseIterations(settings.pairing, settings.iterations);
+    const int coarse = settings.keep_rigid ? static_cast<int>(step % (all + 1))
+                                           : iterationsAt(all, settings, step);
+    const int fine = iterationsAt(settings.iterations - all, settings, step);
+    for (int i = 0; i < coarse + fine; ++i) {
+      loss +=
+          update(model, optimiser, batch, settings, i < coarse ? Module::kRigid : Module::kFine);
+    }
+    loss *= (1.0 - alpha) / (coarse + fine);
   }
-  return loss / iterations;
+  if (alpha > 0.0) loss += alpha * update(model, optimiser, batch, settings, Module::kNonRigid);
+  return loss;
 }
 
 struct ValidationSet {
@@ -146,13 +169,8 @@ ValidationErrors validate(Unirit& model, const ValidationSet& set,
   for (std::int64_t first = 0; first < count; first += kValidationChunk) {
     const Batch part = transformed(slice(all, first, std::min(first + kValidationChunk, count)),
                                    [&](const torch::Tensor& t) { return t.to(settings.device); });
-    torch::Tensor moved = part.source;
-    if (settings.alpha < 1.0) {
-      torch::Tensor target_feature;
-      for (int i = 0; i < kValidationIterations; ++i) {
-        moved = model->rigid->forward(moved, part.target, target_feature).apply(moved);
-      }
-    }
+    const auto moved = model->moveRigidly(part.source, part.target,
+                                          settings.alpha < 1.0 ? kValidationIterations : 0);
     rigid += (rootMeanSquare(moved - part.rigid) * part.scale).sum().item<double>();
     const auto deformed = moved + model->nonrigid->forward(moved, part.target);
     final += (rootMeanSquare(deformed - part.truth) * part.scale).sum().item<double>();

@@ -35,7 +35,7 @@ struct Options {
   std::string output;
   std::string start_from;
   std::string method = "unirit";
-  std::string pairing = "nearest";
+  std::string pairing = toString(NetworkSettings().pairing);
   std::string target = "resampled";
   std::string loss = "supervised";
   std::string device = "cpu";
@@ -109,6 +109,13 @@ void addOptions(CLI::App& app, Options& options) {
       ->capture_default_str();
   app.add_option("--iterations", training.iterations, "Rigid iterations while training")
       ->check(CLI::Range(1, 32))
+      ->capture_default_str();
+  app.add_flag(
+      "--keep-rigid", training.keep_rigid,
+      "The rigid module's weights stay as they are: for pairing offsets, from trained ones");
+  app.add_option("--decoded-points", training.decoded_points,
+                 "Points of each pair whose displacement the non-rigid module learns from")
+      ->check(CLI::PositiveNumber)
       ->capture_default_str();
   app.add_option("--steps", training.steps)->check(CLI::PositiveNumber)->capture_default_str();
   app.add_option("--rigid-steps", training.rigid_steps,
@@ -239,9 +246,8 @@ void run(Options& options) {
   const std::filesystem::path output = options.output;
   requirePlaceFor((output / "unirit.safetensors").string());
   Unirit model(training.pairing);
-  model->setWeights(options.start_from.empty()
-                        ? randomWeights(training.pairing, static_cast<unsigned>(training.seed))
-                        : readWeights(options.start_from));
+  model->setWeights(randomWeights(training.pairing, static_cast<unsigned>(training.seed)));
+  if (!options.start_from.empty()) model->setWeights(readWeights(options.start_from));
   auto [organs, validation] = split(organsOf(options), options.hold_out);
   fillUp(organs, options.subjects, training.seed);
   std::printf("training on %zu organs, validating on %zu\n", organs.size(), validation.size());

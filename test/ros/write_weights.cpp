@@ -9,7 +9,7 @@
 int main(int argc, char** argv) {
   if (argc != 2) return 2;
   try {
-    unirit::Weights weights = unirit::randomWeights(unirit::Pairing::kNearest, 1);
+    unirit::Weights weights = unirit::randomWeights(unirit::NetworkSettings().pairing, 1);
     for (const char* last : {"rigid.decoder.5", "nonrigid.decoder.5"}) {
       weights.layers.at(last).weight *= 0.02F;
     }

@@ -17,6 +17,8 @@ constexpr float kTolerance = 1e-4F;  // of the cloud's extent, which is 2 in the
 Weights strongWeights(Pairing pairing) {
   Weights weights = randomWeights(pairing, 7);
   weights.layers.at("rigid.decoder.5").weight *= 3.0F;
+  // Offsets between clouds without a shape jump: six large steps by them would magnify rounding
+  if (pairing == Pairing::kOffsets) weights.layers.at("fine.decoder.2").weight *= 0.2F;
   weights.layers.at("nonrigid.decoder.5").weight *= 10.0F;
   return weights;
 }
@@ -51,6 +53,7 @@ class GoldenState : public testing::TestWithParam<Pairing> {
     network_ = std::make_unique<Network>(weights_, settings, 2);
   }
 
+  const std::size_t coarse_iterations_ = GetParam() == Pairing::kOffsets ? 2 : 8;
   const Points source_ = cloud(700, 1);
   const Points target_ = cloud(GetParam() == Pairing::kRow ? 700 : 900, 2);
   std::shared_ptr<const Weights> weights_;
@@ -66,9 +69,10 @@ TEST_P(GoldenState, RigidModuleAgreesAfterEveryIteration) {
   torch::Tensor moved = toTensor(source_);
   torch::Tensor target_feature;
   ASSERT_EQ(iterates.size(), 8U);
-  for (const Eigen::Isometry3f& iterate : iterates) {
-    moved = model_->rigid->forward(moved, target, target_feature).apply(moved);
-    const Points ours = iterate * source_;
+  for (std::size_t i = 0; i < iterates.size(); ++i) {
+    auto& module = i < coarse_iterations_ ? model_->rigid : model_->fine;
+    moved = module->forward(moved, target, target_feature).apply(moved);
+    const Points ours = iterates[i] * source_;
     EXPECT_LT((ours - toPoints(moved)).cwiseAbs().maxCoeff(), kTolerance);
   }
   EXPECT_GT((toPoints(moved) - source_).cwiseAbs().maxCoeff(), 0.1F) << "a pose worth comparing";
@@ -87,11 +91,7 @@ TEST_P(GoldenState, WholeNetworkAgrees) {
   const Points moved = network_->estimateRigid(source_, target_) * source_;
   const Points ours = moved + network_->estimateDisplacements(moved, target_, moved);
   const torch::Tensor target = toTensor(target_);
-  torch::Tensor source = toTensor(source_);
-  torch::Tensor target_feature;
-  for (int i = 0; i < 8; ++i) {
-    source = model_->rigid->forward(source, target, target_feature).apply(source);
-  }
+  const torch::Tensor source = model_->moveRigidly(toTensor(source_), target, 8);
   const auto theirs = source + model_->nonrigid->forward(source, target);
   EXPECT_LT((ours - toPoints(theirs)).cwiseAbs().maxCoeff(), 2.0F * kTolerance);
 }

@@ -111,7 +111,7 @@ TEST(RegistrationErrors, RefusesResultsOfAnotherSize) {
 TEST(Unirit, ARefusedCaseStandsAtItsStart) {
   RegistrationPair pair = shiftedSquare();  // four points are fewer than a Registrar accepts
   pair.source_normals = Points::Constant(3, 4, 0.577F);
-  Unirit method(std::make_shared<Weights>(randomWeights(Pairing::kNearest, 1)), {}, true);
+  Unirit method(std::make_shared<Weights>(randomWeights(NetworkSettings().pairing, 1)), {}, true);
   const MethodResult result = method.registerPair(pair);
   EXPECT_TRUE(result.refused);
   // Centroids brought together: the target's is at (3, 5, 0).

@@ -79,7 +79,7 @@ TEST(Methods, FaultyDescriptionsAreRefusedByName) {
 TEST(Methods, UniritIsToldByItsStagesAndWeights) {
   const std::string path =
       (std::filesystem::temp_directory_path() / "methods_test.safetensors").string();
-  writeWeights(randomWeights(Pairing::kNearest, 1), path);
+  writeWeights(randomWeights(NetworkSettings().pairing, 1), path);
   MethodFactory factory(path);
   const auto rigid = factory.make("unirit:stages=rigid", Protocol::kCaseB);
   const auto all = factory.make("unirit:stages=rigid+nonrigid", Protocol::kCaseB);
@@ -104,7 +104,7 @@ TEST(Methods, RowsAreReadByUniritRowsAlone) {
   EXPECT_THROW(factory.make("unirit", Protocol::kPaired), std::invalid_argument);
   EXPECT_THROW(factory.make("unirit-rows:stages=rigid", Protocol::kPaired), std::invalid_argument);
 
-  writeWeights(randomWeights(Pairing::kNearest, 1), path);
+  writeWeights(randomWeights(NetworkSettings().pairing, 1), path);
   EXPECT_THROW(MethodFactory(path).make("unirit-rows", Protocol::kPaired), std::invalid_argument);
   std::filesystem::remove(path);
 }

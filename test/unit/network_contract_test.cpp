@@ -38,7 +38,7 @@ TEST(NetworkContract, weightsOfAnotherPairingAreRefused) {
 }
 
 TEST(NetworkContract, unusableArgumentsOfTheConstructorAreNamed) {
-  const auto weights = loudWeights(Pairing::kNearest);
+  const auto weights = loudWeights(NetworkSettings().pairing);
   expectMentions(sentenceOf<std::invalid_argument>([&] { Network(nullptr, {}, 1); }), "weights");
   expectMentions(sentenceOf<std::invalid_argument>([&] { Network(weights, {}, 0); }), "threads");
   NetworkSettings settings;
@@ -52,7 +52,7 @@ TEST(NetworkContract, unusableArgumentsOfTheConstructorAreNamed) {
 }
 
 TEST(NetworkContract, cloudsThatAreEmptyOrNotFiniteAreNamed) {
-  Network network(loudWeights(Pairing::kNearest), {}, 1);
+  Network network(loudWeights(NetworkSettings().pairing), {}, 1);
   const Points good = randomPoints(9, 1);
   Points bad = good;
   bad(1, 4) = std::numeric_limits<float>::quiet_NaN();
@@ -89,7 +89,7 @@ TEST(NetworkContract, pairingRowNeedsRowsThatBelongTogether) {
 }
 
 TEST(NetworkContract, aQuaternionOfZerosIsAnErrorNotARotation) {
-  auto weights = std::make_shared<Weights>(randomWeights(Pairing::kNearest, 1));
+  auto weights = std::make_shared<Weights>(randomWeights(NetworkSettings().pairing, 1));
   Layer& last = weights->layers.at("rigid.decoder.5");
   last.weight.setZero();
   last.bias.setZero();
@@ -102,7 +102,7 @@ TEST(NetworkContract, aQuaternionOfZerosIsAnErrorNotARotation) {
 TEST(NetworkContract, theRotationStaysARotation) {
   NetworkSettings settings;
   settings.rigid_iterations = 32;
-  Network network(loudWeights(Pairing::kNearest), settings, 1);
+  Network network(loudWeights(NetworkSettings().pairing), settings, 1);
   const Eigen::Matrix3f rotation =
       network.estimateRigid(randomPoints(30, 1), randomPoints(30, 2)).linear();
   EXPECT_LT((rotation * rotation.transpose() - Eigen::Matrix3f::Identity()).norm(), 1e-6F);
@@ -110,7 +110,7 @@ TEST(NetworkContract, theRotationStaysARotation) {
 }
 
 TEST(NetworkContract, randomWeightsStartAtTheIdentity) {
-  Weights weights = randomWeights(Pairing::kNearest, 1);
+  Weights weights = randomWeights(NetworkSettings().pairing, 1);
   for (const Eigen::Index i : {1, 2, 3, 4, 5, 6}) {
     EXPECT_EQ(weights.layers.at("rigid.decoder.5").bias[i], 0.0F);
   }
@@ -135,9 +135,13 @@ TEST(NetworkContract, costsAreThoseOfThePaper) {
   EXPECT_NEAR(giga(0, false) - encoder, 3.17, 0.005);  // with no iteration the target's is left
   EXPECT_NEAR(giga(8, false) - giga(0, false) + encoder, 1.393, 0.0005);
   EXPECT_LT(giga(8, true, Pairing::kNone), giga(8, true));
-  // seven encoders more, and three more inputs of each of the eighteen
-  EXPECT_NEAR(giga(8, true, Pairing::kOffsets) - giga(8, true), 7 * encoder + 18e-9 * 1024 * 3 * 64,
-              1e-9);
+  // the fine module in place of six iterations: two encoders of half the features and its decoder;
+  // three more inputs of the non-rigid encoders
+  const double fine = 2e-9 * 1024 * 82304 + 1e-9 * 329472;
+  const double coarse = giga(8, true) - giga(7, true);
+  EXPECT_NEAR(giga(8, true, Pairing::kOffsets) - giga(8, true),
+              6 * (fine - coarse) + 2e-9 * 1024 * 3 * 64, 1e-9);
+  EXPECT_NEAR(giga(2, true, Pairing::kOffsets) - giga(2, true), 2e-9 * 1024 * 3 * 64, 1e-9);
 }
 
 TEST(Normalisation, putsTheSourceIntoTheUnitCube) {

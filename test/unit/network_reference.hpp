@@ -24,8 +24,9 @@ inline Eigen::MatrixXd dense(const Weights& weights, const std::string& name,
 
 inline Eigen::MatrixXd decode(const Weights& weights, const std::string& name,
                               Eigen::MatrixXd values) {
-  for (int i = 0; i < 6; ++i) {
-    values = dense(weights, name + "." + std::to_string(i), values, i < 5);
+  const auto layer = [&](int i) { return name + "." + std::to_string(i); };
+  for (int i = 0; weights.layers.count(layer(i)) > 0; ++i) {
+    values = dense(weights, layer(i), values, weights.layers.count(layer(i + 1)) > 0);
   }
   return values;
 }
@@ -43,11 +44,9 @@ inline Eigen::Matrix3Xd offsets(const Eigen::Matrix3Xd& points, const Eigen::Mat
 
 inline Eigen::VectorXd encode(const Weights& weights, const std::string& name,
                               const Eigen::Matrix3Xd& points, const Eigen::Matrix3Xd& others) {
-  Eigen::MatrixXd values(encoderInputs(weights.pairing), points.cols());
+  Eigen::MatrixXd values(weights.layers.at(name + ".0").weight.cols(), points.cols());
   values.topRows(3) = points;
-  if (weights.pairing == Pairing::kOffsets) {
-    values.bottomRows(3) = offsets(points, others);
-  }
+  if (values.rows() == kOffsetInputs) values.bottomRows(3) = offsets(points, others);
   for (int i = 0; i < 5; ++i) {
     values = dense(weights, name + "." + std::to_string(i), values, true);
   }
@@ -56,9 +55,10 @@ inline Eigen::VectorXd encode(const Weights& weights, const std::string& name,
 
 inline Eigen::VectorXd features(const Weights& weights, const std::string& module,
                                 const Eigen::Matrix3Xd& source, const Eigen::Matrix3Xd& target) {
-  Eigen::VectorXd both(2 * kFeatureSize);
-  both << encode(weights, module + ".source_encoder", source, target),
-      encode(weights, module + ".target_encoder", target, source);
+  const auto of_source = encode(weights, module + ".source_encoder", source, target),
+             of_target = encode(weights, module + ".target_encoder", target, source);
+  Eigen::VectorXd both(of_source.size() + of_target.size());
+  both << of_source, of_target;
   return both;
 }
 
@@ -68,9 +68,11 @@ inline std::vector<Eigen::Isometry3d> estimateRigid(const Weights& weights, cons
   std::vector<Eigen::Isometry3d> iterates;
   Eigen::Isometry3d transform = Eigen::Isometry3d::Identity();
   for (int i = 0; i < iterations; ++i) {
+    const bool coarse = i < coarseIterations(weights.pairing, iterations);
+    const std::string module = coarse ? "rigid" : "fine";
     const Eigen::Matrix3Xd moved = transform * source.cast<double>();
-    const Eigen::VectorXd pose =
-        decode(weights, "rigid.decoder", features(weights, "rigid", moved, target.cast<double>()));
+    const Eigen::VectorXd pose = decode(weights, module + ".decoder",
+                                        features(weights, module, moved, target.cast<double>()));
     const Eigen::Quaterniond rotation(pose[0], pose[1], pose[2], pose[3]);
     const Eigen::Isometry3d step = Eigen::Translation3d(pose.tail<3>()) * rotation.normalized();
     transform = step * transform;

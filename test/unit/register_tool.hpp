@@ -36,7 +36,7 @@ class RegisterTool : public ::testing::Test {
   static void SetUpTestSuite() {
     folder() = fs::temp_directory_path() / ("unirit_register_" + std::to_string(::getpid()));
     fs::create_directories(folder());
-    writeWeights(randomWeights(Pairing::kNearest, 1), at("weights.safetensors"));
+    writeWeights(randomWeights(NetworkSettings().pairing, 1), at("weights.safetensors"));
     const Surface kidney = makePhantom("kidney", 1, 900);
     writePly(kidney, at("organ.ply"), kMillimetre);
     writePly(kidney, at("organ_in_metres.ply"), 1.0);

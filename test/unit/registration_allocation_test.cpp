@@ -29,7 +29,7 @@ class RegistrationAllocation : public testing::Test {
   /// Of a call after the first two, from a cold or warm start.
   long inSteadyState(const RegistrationSettings& settings, bool warm) const {
     static const auto weights =
-        std::make_shared<const Weights>(randomWeights(Pairing::kNearest, 1));
+        std::make_shared<const Weights>(randomWeights(NetworkSettings().pairing, 1));
     Registrar registrar(weights, settings);
     Registration registration;
     const auto registerClouds = [&] {

@@ -27,7 +27,8 @@ PointCloud seen(const RegistrationPair& pair) { return {pair.target, {}, pair.vi
 Registration registered(const PointCloud& preoperative, const PointCloud& intraoperative,
                         const std::vector<Stage>& stages,
                         Correspondence correspondence = Correspondence::kSurface) {
-  static const auto weights = std::make_shared<const Weights>(randomWeights(Pairing::kNearest, 1));
+  static const auto weights =
+      std::make_shared<const Weights>(randomWeights(NetworkSettings().pairing, 1));
   RegistrationSettings settings;
   settings.stages = stages;
   settings.refinement.correspondence = correspondence;
@@ -177,7 +178,7 @@ TEST(RefinedDeformation, MovesTheInsideSmoothlyAndNearerToTheTruth) {
 TEST(RegistrationStages, RefuseOtherOrgansAndAcceptTheirOwn) {
   RegistrationSettings settings;
   settings.stages = {Stage::kRefine};
-  Registrar registrar(std::make_shared<const Weights>(randomWeights(Pairing::kNearest, 1)),
+  Registrar registrar(std::make_shared<const Weights>(randomWeights(NetworkSettings().pairing, 1)),
                       settings);
   int others = 0, others_refused = 0;
   for (const std::string& name : phantomOrgans()) {

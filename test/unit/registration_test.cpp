@@ -15,7 +15,8 @@ using test::bumpyEllipsoid;
 using test::shuffled;
 
 std::shared_ptr<const Weights> weights() {
-  static const auto weights = std::make_shared<const Weights>(randomWeights(Pairing::kNearest, 1));
+  static const auto weights =
+      std::make_shared<const Weights>(randomWeights(NetworkSettings().pairing, 1));
   return weights;
 }
 

@@ -128,7 +128,8 @@ TEST_F(BenchmarkTool, ShardsMergeToTheWholeOnAnyNumberOfThreads) {
 }
 
 TEST_F(BenchmarkTool, TablesNameTheWeights) {
-  writeWeights(randomWeights(Pairing::kNearest, 1), (folder_ / "random.safetensors").string());
+  writeWeights(randomWeights(NetworkSettings().pairing, 1),
+               (folder_ / "random.safetensors").string());
   ASSERT_EQ(run("--phantoms 1 --points 64 --protocols caseb --weights random.safetensors "
                 "--methods unirit:stages=rigid,fpt@unirit:stages=nonrigid --output out"),
             0)
@@ -180,7 +181,8 @@ TEST_F(BenchmarkTool, WritesCloudsWhereAsked) {
 }
 
 TEST_F(BenchmarkTool, WritesTheDeviationsThatAMethodExpects) {
-  writeWeights(randomWeights(Pairing::kNearest, 1), (folder_ / "random.safetensors").string());
+  writeWeights(randomWeights(NetworkSettings().pairing, 1),
+               (folder_ / "random.safetensors").string());
   ASSERT_EQ(run("--phantoms 1 --points 200 --protocols resampled --weights random.safetensors "
                 "--methods identity,ours@unirit:stages=refine --clouds --output out"),
             0)

@@ -24,7 +24,8 @@ class RefusalsTool : public ::testing::Test {
   void SetUp() override {
     folder_ = fs::temp_directory_path() / ("unirit_refusals_" + std::to_string(::getpid()));
     fs::create_directories(folder_);
-    writeWeights(randomWeights(Pairing::kNearest, 1), (folder_ / "random.safetensors").string());
+    writeWeights(randomWeights(NetworkSettings().pairing, 1),
+                 (folder_ / "random.safetensors").string());
   }
   void TearDown() override { fs::remove_all(folder_); }
 

@@ -20,7 +20,7 @@ class Stream {
  public:
   explicit Stream(const RegistrationPair& pair, int warm_iterations = 8)
       : organ_{pair.source, pair.source_normals},
-        registrar_(std::make_shared<const Weights>(randomWeights(Pairing::kNearest, 1)),
+        registrar_(std::make_shared<const Weights>(randomWeights(NetworkSettings().pairing, 1)),
                    settings(warm_iterations)) {}
 
   Registration next(const RegistrationPair& view) { return next(view, nullptr); }
