@@ -28,6 +28,8 @@ train=$(realpath "$1") test=$(realpath "$2") output=$(realpath -m "$3") device=$
 source "$(dirname "${BASH_SOURCE[0]}")/setup.sh"
 programs=$root/build/devel/lib/unirit
 shipped=$root/models/unirit.safetensors
+offsets=weights=$root/models/unirit_offsets.safetensors:network/pairing=offsets
+offsets+=:network/rigid_iterations=5
 networks=$output/networks
 
 # network NAME STEPS OPTION...: trains it unless it is there.
@@ -79,7 +81,7 @@ compare() {
 rivals=(identity best-rigid icp gicp cpd-rigid cpd bcpd)
 ours=("rigid module@unirit:stages=rigid:$open"
   "non-rigid module@unirit:stages=nonrigid:$(weightsOf norigid):$open"
-  "UniRiT@unirit:$alone" unirit)
+  "UniRiT@unirit:$alone" "UniRiT with offsets@unirit:$alone:$offsets" unirit)
 fpt="FPT@unirit:stages=nonrigid:$(weightsOf fpt):$open"
 
 compare all --data "$test" --label "real organs (test split)" \
@@ -95,7 +97,8 @@ few=()
 for count in 1 2 4 8; do few+=("UniRiT of $count livers@unirit:$(weightsOf "liver$count"):$alone"); done
 compare liver --data "$output/organs/liver" --label "livers (test split)" --pairs 8 \
   --protocols permuted resampled caseb partial \
-  --methods identity best-rigid icp cpd bcpd "${few[@]}" "UniRiT@unirit:$alone" unirit
+  --methods identity best-rigid icp cpd bcpd "${few[@]}" "UniRiT@unirit:$alone" \
+  "UniRiT with offsets@unirit:$alone:$offsets" unirit
 
 compare paired --data "$test" --label "real organs (test split)" --protocols paired permuted \
   --methods identity cpd "UniRiT by rows@unirit-rows:$(weightsOf row)" \
