@@ -24,7 +24,7 @@ void measureForward(benchmark::State& state, Pairing pairing) {
   setRate(state, forwardMultiplyAdds(pairing));
 }
 
-/// Of the published layers, and of those the node runs.
+/// Of the published layers, and of those of pairing offsets.
 void unirit_forward(benchmark::State& state) { measureForward(state, Pairing::kNearest); }
 void unirit_forward_offsets(benchmark::State& state) { measureForward(state, Pairing::kOffsets); }
 

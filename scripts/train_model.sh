@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
 # Usage: train_model.sh ORGANS OUTPUT [cpu|cuda]
-# Makes the shipped weights again: trains on ORGANS/ORGAN/*.ply (millimetres) and on digital
-# phantoms, and leaves checkpoint, curves and unirit.safetensors in OUTPUT. Run again, it goes on
+# Trains weights as those of models/unirit.safetensors were: on ORGANS/ORGAN/*.ply (millimetres) and
+# on digital phantoms, and leaves checkpoint, curves and unirit.safetensors in OUTPUT. Run again, it goes on
 # where it was stopped. With cuda (a LibTorch that has it, see src/training/CMakeLists.txt) it takes
 # minutes, else a day and more.
 set -euo pipefail

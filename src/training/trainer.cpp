@@ -13,7 +13,7 @@ namespace {
 constexpr double kFinalRate = 0.01;       // of the first learning rate
 constexpr double kGrowthShare = 0.3;      // of the steps, over which the iterations grow
 constexpr double kWarmUpSteps = 200.0;    // the learning rate rises from zero
-constexpr double kLargestGradient = 1.0;  // norm, over all parameters
+constexpr double kLargestGradient = 1.0;  // norm, over a module's parameters
 constexpr int kValidationIterations = 8;
 constexpr std::int64_t kValidationPairs = 2;  // an organ
 constexpr std::int64_t kValidationPoints = 1024;
@@ -120,15 +120,16 @@ torch::Tensor update(Unirit& model, torch::optim::Adam& optimiser, Batch& batch,
 
 /// One step: an update for every iteration of the rigid modules, each on the output of the one
 /// before, so that it has seen what it will be given, then one of the non-rigid module. They share
-/// no weights and what passes between them is detached: these are the gradients of the paper's
-/// L_total, which is returned. A rigid module that is kept is passed over in some of the steps:
-/// from its outputs alone the fine one does not begin to learn.
+/// no weights, what passes between them is detached and Adam does not see a loss's scale, so alpha
+/// between 0 and 1 weighs only what is returned, the paper's L_total. A rigid module that is kept
+/// is passed over in some of the steps: from its outputs alone the fine one does not begin to
+/// learn.
 torch::Tensor learn(Unirit& model, torch::optim::Adam& optimiser, Batch batch,
                     const TrainingSettings& settings, std::int64_t step) {
   const double alpha = step < settings.rigid_steps ? 0.0 : settings.alpha;
   torch::Tensor loss = torch::zeros({}, batch.source.options());
   if (alpha < 1.0) {
-    const int all = coarseIterations(settings.pairing, settings.iterations);
+    const int all = coarseIterations(model->pairing(), settings.iterations);
     const int coarse = settings.keep_rigid ? static_cast<int>(step % (all + 1))
                                            : iterationsAt(all, settings, step);
     const int fine = iterationsAt(settings.iterations - all, settings, step);

@@ -20,13 +20,13 @@ struct TrainingSettings {
   BatchSettings batch;
   Pairing pairing = NetworkSettings().pairing;
   Loss loss = Loss::kSupervised;
-  double alpha = 0.5;       ///< weight of L_gl; 1 - alpha is that of L_rd (paper's L_total)
-  int iterations = 4;       ///< of the rigid modules while training, grown from 1
-  bool keep_rigid = false;  ///< the first rigid module's weights stay as they are
+  double alpha = 0.5;  ///< weight of L_gl in the paper's L_total; 0 and 1 leave modules as they are
+  int iterations = 4;  ///< of the rigid modules while training, grown from 1
+  bool keep_rigid = false;           ///< the first rigid module's weights stay as they are
   std::int64_t decoded_points = 64;  ///< of each pair, whose displacement is learnt from
   double learning_rate = 1e-3;       ///< Adam's; falls to a hundredth along a cosine
   std::int64_t steps = 20000;
-  std::int64_t rigid_steps = 0;  ///< of them, the first ones, that train the rigid module alone
+  std::int64_t rigid_steps = 0;  ///< of them, the first ones, that train the rigid modules alone
   std::int64_t report_every = 100;
   std::int64_t save_every = 500;
   std::uint64_t seed = 1;

@@ -103,8 +103,8 @@ void addOptions(CLI::App& app, Options& options) {
       ->check(CLI::IsMember({"supervised", "paper"}))
       ->capture_default_str();
   app.add_option("--alpha", training.alpha,
-                 "Weight of the global loss; 0 trains the rigid module "
-                 "alone, 1 the non-rigid module alone")
+                 "Weight of the global loss in the loss shown; 0 trains the rigid modules alone, 1 "
+                 "the non-rigid module alone")
       ->check(CLI::Range(0.0, 1.0))
       ->capture_default_str();
   app.add_option("--iterations", training.iterations, "Rigid iterations while training")
@@ -119,7 +119,7 @@ void addOptions(CLI::App& app, Options& options) {
       ->capture_default_str();
   app.add_option("--steps", training.steps)->check(CLI::PositiveNumber)->capture_default_str();
   app.add_option("--rigid-steps", training.rigid_steps,
-                 "The first of them, that train the rigid module alone")
+                 "The first of them, that train the rigid modules alone")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
   app.add_option("--batch", batch.pairs, "Pairs a step")
@@ -225,6 +225,21 @@ void printProgress(const Progress& p) {
   std::fflush(stdout);
 }
 
+/// Refuses what would run a module that was never trained.
+void requireSense(const Options& options) {
+  const TrainingSettings& training = options.training;
+  const bool offsets = training.pairing == Pairing::kOffsets;
+  if (offsets && training.alpha < 1.0 &&
+      coarseIterations(training.pairing, training.iterations) == training.iterations) {
+    throw std::runtime_error("--iterations: too few to train the fine module of pairing offsets");
+  }
+  if (!training.keep_rigid) return;
+  if (!offsets) throw std::runtime_error("--keep-rigid: for pairing offsets alone");
+  if (options.start_from.empty()) {
+    throw std::runtime_error("--keep-rigid: needs trained weights, see --start-from");
+  }
+}
+
 void run(Options& options) {
   TrainingSettings& training = options.training;
   if (options.method == "fpt") {
@@ -243,6 +258,7 @@ void run(Options& options) {
     at::globalContext().setAllowTF32CuBLAS(true);  // ten mantissa bits, several times as fast
   }
   if (training.threads > 1) torch::set_num_threads(1);
+  requireSense(options);
   const std::filesystem::path output = options.output;
   requirePlaceFor((output / "unirit.safetensors").string());
   Unirit model(training.pairing);

@@ -53,7 +53,7 @@ class GoldenState : public testing::TestWithParam<Pairing> {
     network_ = std::make_unique<Network>(weights_, settings, 2);
   }
 
-  const std::size_t coarse_iterations_ = GetParam() == Pairing::kOffsets ? 2 : 8;
+  const std::size_t coarse_iterations_ = static_cast<std::size_t>(coarseIterations(GetParam(), 8));
   const Points source_ = cloud(700, 1);
   const Points target_ = cloud(GetParam() == Pairing::kRow ? 700 : 900, 2);
   std::shared_ptr<const Weights> weights_;

@@ -219,6 +219,24 @@ TEST_F(Training, KeepsTheRigidModuleWhereAskedTo) {
   EXPECT_EQ(trainedModules(), (std::set<std::string>{"fine", "nonrigid"}));
 }
 
+TEST_F(Training, LearnsFromAsManyPointsAsAskedFor) {
+  const Weights of_all = trained(settings_, folder_ / "all");
+  settings_.decoded_points = 7;
+  const Weights of_some = trained(settings_, folder_ / "some");
+  EXPECT_GT(difference(of_all, of_some), 0.0);
+}
+
+TEST_F(Training, PartsOfABatchTeachWhatTheWholeTeaches) {
+  settings_.steps = settings_.report_every = settings_.save_every = 1;
+  const auto lossInParts = [&](int threads) {
+    settings_.threads = threads;
+    trained(settings_, folder_ / std::to_string(threads));
+    return last_.loss;
+  };
+  const double whole = lossInParts(1);
+  EXPECT_NEAR(lossInParts(3), whole, 1e-4 * whole);
+}
+
 TEST_F(Training, DecodesAsManyPointsAsAskedFor) {
   const torch::NoGradGuard no_grad;
   for (const Pairing pairing :

@@ -59,7 +59,7 @@ class Network {
 };
 
 /// Multiply-adds of one forward pass with n rigid iterations, as published and with the two exact
-/// savings (target feature once, unless the encoders read offsets; the decoder's global columns
+/// savings (the published rigid module's target feature once; the decoder's global columns
 /// once per pair). Searches for nearest points are not counted.
 double multiplyAdds(Eigen::Index source_points, Eigen::Index target_points, int rigid_iterations,
                     Pairing pairing, bool with_savings);
