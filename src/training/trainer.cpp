@@ -7,6 +7,8 @@
 #include <stdexcept>
 #include <thread>
 
+#include "checkpoint.hpp"
+
 namespace unirit::training {
 namespace {
 
@@ -50,7 +52,7 @@ enum class Module { kRigid, kFine, kNonRigid };
 
 struct Outcome {
   torch::Tensor loss;
-  torch::Tensor moved;  // the source, detached
+  torch::Tensor moved;  // the source, detached; of the rigid modules alone
 };
 
 /// One pass of a module from where batch.source stands, and its loss. That of the non-rigid module
@@ -66,8 +68,7 @@ Outcome pass(Unirit& model, const Batch& batch, const TrainingSettings& settings
   const std::int64_t points = std::min(settings.decoded_points, batch.source.size(1));
   const auto moved = batch.source.slice(1, 0, points) +
                      model->nonrigid->forward(batch.source, batch.target, points);
-  return {distance(settings.loss, moved, batch.truth.slice(1, 0, points), batch.target),
-          moved.detach()};
+  return {distance(settings.loss, moved, batch.truth.slice(1, 0, points), batch.target), {}};
 }
 
 /// Calls `work` with the number, first and last pair of each part of a batch, at once. On the CPU
@@ -185,56 +186,6 @@ double learningRate(const TrainingSettings& settings, std::int64_t step) {
   return settings.learning_rate * cosine *
          std::min(1.0, (static_cast<double>(step) + 1.0) / kWarmUpSteps);
 }
-
-/// Network, optimiser and progress in one file, replaced atomically.
-class Checkpoint {
- public:
-  explicit Checkpoint(const std::filesystem::path& folder) : path_(folder / "checkpoint.pt") {}
-
-  void save(Unirit& model, torch::optim::Adam& optimiser, std::int64_t step, double seconds) const {
-    torch::serialize::OutputArchive archive, network, state;
-    model->save(network);
-    optimiser.save(state);
-    archive.write("network", network);
-    archive.write("optimiser", state);
-    archive.write("pairing", torch::tensor(static_cast<int>(model->pairing())));
-    archive.write("step", torch::tensor(step));
-    archive.write("seconds", torch::tensor(seconds, torch::kFloat64));
-    const std::filesystem::path fresh = path_.string() + ".new";
-    archive.save_to(fresh.string());
-    std::filesystem::rename(fresh, path_);
-  }
-
-  /// False where there is none.
-  bool load(Unirit& model, torch::optim::Adam& optimiser, std::int64_t& step,
-            double& seconds) const {
-    if (!std::filesystem::exists(path_)) return false;
-    try {
-      torch::serialize::InputArchive archive, network, state;
-      torch::Tensor saved_pairing, saved_step, saved_seconds;
-      archive.load_from(path_.string());
-      archive.read("pairing", saved_pairing);
-      if (saved_pairing.item<int>() != static_cast<int>(model->pairing())) {
-        throw std::runtime_error(path_.string() + ": its network's pairing is another");
-      }
-      archive.read("network", network);
-      archive.read("optimiser", state);
-      archive.read("step", saved_step);
-      archive.read("seconds", saved_seconds);
-      model->load(network);
-      optimiser.load(state);
-      step = saved_step.item<std::int64_t>();
-      seconds = saved_seconds.item<double>();
-    } catch (const c10::Error& error) {
-      throw std::runtime_error(path_.string() + ": not a checkpoint of this network (" +
-                               error.what_without_backtrace() + ")");
-    }
-    return true;
-  }
-
- private:
-  std::filesystem::path path_;
-};
 
 class Curves {
  public:
