@@ -123,7 +123,7 @@ Eigen::Isometry3f Network::estimateRigid(const Points& source, const Points& tar
   requireCloud(target, "target");
   auto& network = *implementation_;
   const int coarse = coarseIterations(network.pairing, network.rigid_iterations);
-  network.offsetsTo(target, network.to_target);
+  if (coarse < network.rigid_iterations) network.to_target.setOthers(target);
   network.moved = source;
   Eigen::Quaternionf rotation = Eigen::Quaternionf::Identity();
   Eigen::Isometry3f transform = Eigen::Isometry3f::Identity();
