@@ -24,7 +24,7 @@ float disagreement(const LibtorchNetwork& other) {
   return torch::max(rigid, nonrigid).item<float>();
 }
 
-/// The same work as unirit_forward; refuses to be timed where its output differs.
+/// The same work as published_forward; refuses to be timed where its output differs.
 void libtorch_forward(benchmark::State& state) {
   const torch::NoGradGuard no_grad;
   const auto threads = static_cast<int>(state.range(0));

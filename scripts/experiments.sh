@@ -28,8 +28,7 @@ train=$(realpath "$1") test=$(realpath "$2") output=$(realpath -m "$3") device=$
 source "$(dirname "${BASH_SOURCE[0]}")/setup.sh"
 programs=$root/build/devel/lib/unirit
 shipped=$root/models/unirit.safetensors
-offsets=weights=$root/models/unirit_offsets.safetensors:network/pairing=offsets
-offsets+=:network/rigid_iterations=5
+published=weights=$root/models/unirit_published.safetensors
 networks=$output/networks
 
 # network NAME STEPS OPTION...: trains it unless it is there.
@@ -37,7 +36,7 @@ network() {
   local folder=$networks/$1
   [[ -f $folder/unirit.safetensors ]] && return 0
   "$programs/unirit_train" --output "$folder" --device "$device" --data-threads "$(nproc)" \
-    --steps "$2" --batch 128 --points 512 --near-share 0.3 --pairs-per-deformation 16 \
+    --steps "$2" --learning-rate 1e-3 --batch 128 --points 512 --near-share 0.3 --pairs-per-deformation 16 \
     --report-every 250 --save-every 250 "${@:3}"
 }
 
@@ -52,12 +51,12 @@ choose() {
 
 all=(--data "$train" --phantoms 6 --hold-out 24)
 network fpt 1200 "${all[@]}" --method fpt
-network norigid 1200 "${all[@]}" --alpha 1
+network norigid 1200 "${all[@]}" --pairing nearest --alpha 1
 network row 2800 "${all[@]}" --pairing row --target paired --partial-share 0 --rotation 0
 livers=("$train"/liver/*)
 for count in 1 2 4 8; do
   choose "$output/organs/liver$count" "${livers[@]:0:count}"
-  network "liver$count" 900 --data "$output/organs/liver$count" --hold-out 100
+  network "liver$count" 900 --pairing nearest --data "$output/organs/liver$count" --hold-out 100
 done
 
 # The network alone is judged in all cases: its limits are opened.
@@ -79,9 +78,9 @@ compare() {
 }
 
 rivals=(identity best-rigid icp gicp cpd-rigid cpd bcpd)
-ours=("rigid module@unirit:stages=rigid:$open"
+ours=("rigid module@unirit:stages=rigid:$published:$open"
   "non-rigid module@unirit:stages=nonrigid:$(weightsOf norigid):$open"
-  "UniRiT@unirit:$alone" "UniRiT with offsets@unirit:$alone:$offsets" unirit)
+  "UniRiT@unirit:$alone:$published" "UniRiT by flow@unirit:$alone" unirit)
 fpt="FPT@unirit:stages=nonrigid:$(weightsOf fpt):$open"
 
 compare all --data "$test" --label "real organs (test split)" \
@@ -97,9 +96,9 @@ few=()
 for count in 1 2 4 8; do few+=("UniRiT of $count livers@unirit:$(weightsOf "liver$count"):$alone"); done
 compare liver --data "$output/organs/liver" --label "livers (test split)" --pairs 8 \
   --protocols permuted resampled caseb partial \
-  --methods identity best-rigid icp cpd bcpd "${few[@]}" "UniRiT@unirit:$alone" \
-  "UniRiT with offsets@unirit:$alone:$offsets" unirit
+  --methods identity best-rigid icp cpd bcpd "${few[@]}" "UniRiT@unirit:$alone:$published" \
+  "UniRiT by flow@unirit:$alone" unirit
 
 compare paired --data "$test" --label "real organs (test split)" --protocols paired permuted \
   --methods identity cpd "UniRiT by rows@unirit-rows:$(weightsOf row)" \
-  "UniRiT@unirit:$alone"
+  "UniRiT@unirit:$alone:$published"

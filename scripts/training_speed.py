@@ -3,13 +3,13 @@
 """Usage: training_speed.py UNIRIT_TRAIN [--cores N...] [--batch N] [--points N] [--steps N]
        [--iterations N] [--repeats N]
 
-Trains the network by UNIRIT_TRAIN and by python's torch in turn, on the same cores, and prints a
+Trains networks by UNIRIT_TRAIN and by python's torch in turn, on the same cores, and prints a
 Markdown table of the medians of their speeds, in pairs a second of the clock and a second of a
-core's time, which other work on the machine disturbs less: once the rigid module alone, once both
-modules. The python side has the same layers, batch, points, loss, rigid iterations and optimiser
-step, and the savings that a user of torch can write down: the target's rigid feature once a pair,
-the decoder's global columns once a pair. Its clouds lie ready in memory; unirit_train makes its
-pairs meanwhile, on the same cores.
+core's time, which other work on the machine disturbs less: the published rigid module, both
+published modules, and the flow module. The python side has the same layers, batch, points, loss,
+iterations, an optimiser step after each of them, as many decoded points, and the decoder's global
+columns once a pair. Its clouds lie ready in memory; unirit_train makes its pairs meanwhile, on the
+same cores.
 
 Needs Debian's python3-torch, which nothing else here does, so it is not in packages.txt.
 """
@@ -25,8 +25,14 @@ import time
 ENCODER = [3, 64, 64, 64, 128, 1024]
 RIGID_DECODER = [2048, 1024, 1024, 512, 512, 256, 7]
 NONRIGID_DECODER = [2054, 1024, 512, 256, 128, 64, 3]
-PARAMETERS = 7466122
-PHASES = {"rigid": 0.0, "both": 0.5}  # weights of the global loss
+DECODED_POINTS = 64
+FLOW_ENCODER = [32, 64, 64, 128, 256]
+FLOW_SCALES = [0.8, 0.4, 0.2, 0.1]
+FLOW_INPUTS, FLOW_TARGET_INPUTS = 43, 6
+FLOW_DECODER = [FLOW_INPUTS + 512, 128, 128, 64, 12]
+PARAMETERS = {"nearest": 7466122, "offsets": 193580}
+PHASES = {"rigid": ("nearest", 0.0), "both": ("nearest", 0.5),
+          "flow": ("offsets", 0.5)}  # pairing and weight of the global loss
 
 
 def environment(cores):
@@ -67,7 +73,8 @@ def speed_of_unirit(options, phase, cores):
         curves = os.path.join(folder, "curves.csv")
         with start_on(cores, [
                 options.unirit_train, "--phantoms", "1", "--output", folder, "--threads",
-                str(len(cores)), "--alpha", str(PHASES[phase]), "--batch", str(options.batch),
+                str(len(cores)), "--pairing", PHASES[phase][0], "--alpha", str(PHASES[phase][1]),
+                "--decoded-points", str(DECODED_POINTS), "--batch", str(options.batch),
                 "--points", str(options.points), "--iterations", str(options.iterations),
                 "--steps", str(3 * options.steps), "--report-every", str(options.steps)]) as train:
             used = []
@@ -114,9 +121,9 @@ def train_with_torch(options):
         return made[-1](values)
 
     class Encoder(nn.Module):
-        def __init__(self):
+        def __init__(self, widths=tuple(ENCODER)):
             super().__init__()
-            self.layers = layers(ENCODER)
+            self.layers = layers(widths)
 
         def forward(self, points):  # the maximum commutes with the ReLU
             return torch.relu(run_layers(self.layers, points).max(1).values)
@@ -128,8 +135,9 @@ def train_with_torch(options):
             self.decoder[-1].weight.data *= 0.05
             self.decoder[-1].bias.data[0] = 1.0
 
-        def forward(self, moved, feature):
-            output = run_layers(self.decoder, torch.cat([self.source(moved), feature], 1))
+        def forward(self, moved, target):
+            features = torch.cat([self.source(moved), self.target(target)], 1)
+            output = run_layers(self.decoder, features)
             w, x, y, z = nn.functional.normalize(output[:, :4]).unbind(1)
             rotation = torch.stack(
                 [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y),
@@ -147,41 +155,105 @@ def train_with_torch(options):
             features = torch.cat([self.source(moved), self.target(target)], 1)
             with torch.no_grad():
                 index = torch.cdist(moved, target).argmin(2)
-            offset = target.gather(1, index.unsqueeze(2).expand(-1, -1, 3)) - moved
+            some = moved[:, :DECODED_POINTS]
+            offset = target.gather(1, of_points(index[:, :DECODED_POINTS])) - some
             first = self.decoder[0]
             point, columns, pairing = first.weight.split([3, 2048, 3], 1)
-            values = nn.functional.linear(torch.cat([moved, offset], 2),
+            values = nn.functional.linear(torch.cat([some, offset], 2),
                                           torch.cat([point, pairing], 1))
             values = values + nn.functional.linear(features, columns, first.bias).unsqueeze(1)
             return run_layers(self.decoder[1:], torch.relu(values))
+
+    def surroundings(source, target):
+        distances = torch.cdist(source, target)
+        to_target = target.gather(1, of_points(distances.argmin(2))) - source
+        nearest = distances.argmin(1)
+        to_source = source.gather(1, of_points(nearest)) - target
+        count = torch.zeros_like(source[:, :, :1]).scatter_add_(
+            1, nearest.unsqueeze(2), torch.ones_like(target[:, :, :1]))
+        total = torch.zeros_like(source).scatter_add_(1, of_points(nearest), -to_source)
+        values = torch.cat([to_target, total, count, torch.ones_like(count)], 2)
+        squares = torch.cdist(source, source).square()
+        kernel = (squares * (-0.5 / FLOW_SCALES[0] ** 2)).exp()
+        vectors, inputs = [to_target], [source]
+        for scale in FLOW_SCALES:
+            if scale < FLOW_SCALES[0]:
+                kernel = kernel.square().square()
+            forth, back, seen, weight = torch.bmm(kernel, values).split([3, 3, 1, 1], 2)
+            vectors += [forth / weight, back / (seen + 0.01)]
+            inputs.append(seen / weight * source.shape[1] / target.shape[1])
+        vectors = torch.stack(vectors, 2)
+        return (torch.cat(inputs + [vectors.flatten(2), vectors.norm(dim=3)], 2), vectors,
+                torch.cat([target, to_source], 2))
+
+    class Flow(nn.Module):
+        def __init__(self):
+            super().__init__()
+            self.source = Encoder([FLOW_INPUTS] + FLOW_ENCODER)
+            self.target = Encoder([FLOW_TARGET_INPUTS] + FLOW_ENCODER)
+            self.decoder = layers(FLOW_DECODER)
+
+        def forward(self, moved, target):
+            with torch.no_grad():
+                of_source, vectors, of_target = surroundings(moved, target)
+            features = torch.cat([self.source(of_source), self.target(of_target)], 1)
+            first = self.decoder[0]
+            point, columns = first.weight.split([FLOW_INPUTS, 512], 1)
+            values = nn.functional.linear(of_source, point)
+            values = values + nn.functional.linear(features, columns, first.bias).unsqueeze(1)
+            output = run_layers(self.decoder[1:], torch.relu(values))
+            return output[:, :, :3] + (output[:, :, 3:].unsqueeze(3) * vectors).sum(2)
+
+    def best_rigid_fit(source, moved):
+        source_centre, centre = source.mean(1, True), moved.mean(1, True)
+        covariance = (source - source_centre).transpose(1, 2) @ (moved - centre)
+        u, _, vt = torch.linalg.svd(covariance.double(), full_matrices=False)
+        v = vt.transpose(1, 2).clone()
+        v[:, :, 2] *= torch.linalg.det(u @ vt).sign().unsqueeze(1)
+        rotation = (v @ u.transpose(1, 2)).float()
+        return (source - source_centre) @ rotation.transpose(1, 2) + centre
+
+    def of_points(index):
+        return index.unsqueeze(2).expand(-1, -1, 3)
 
     def root_mean_square(offsets):
         return (offsets.square().sum(2).mean(1) + 1e-12).sqrt().mean()
 
     torch.set_num_threads(options.cores[0])
     torch.manual_seed(1)
-    alpha = PHASES[options.torch]
-    network = nn.ModuleDict({"rigid": Rigid(), "nonrigid": NonRigid()})
-    assert sum(p.numel() for p in network.parameters()) == PARAMETERS
+    pairing, alpha = PHASES[options.torch]
+    network = nn.ModuleDict({"rigid": Rigid(), "nonrigid": NonRigid()}
+                            if pairing == "nearest" else {"flow": Flow()})
+    assert sum(p.numel() for p in network.parameters()) == PARAMETERS[pairing]
     optimiser = torch.optim.Adam(network.parameters(), 1e-3)
     source, target, truth, rigid = torch.rand(4, options.batch, options.points, 3) * 2 - 1
 
-    def step():
-        optimiser.zero_grad()
-        moved, loss = source, 0.0
-        feature = network["rigid"].target(target)
-        for _ in range(options.iterations):
-            moved = network["rigid"](moved.detach(), feature)
-            loss = loss + (1 - alpha) * root_mean_square(moved - rigid) / options.iterations
-        if alpha > 0.0:
-            moved = moved.detach()
-            deformed = moved + network["nonrigid"](moved, target)
-            loss = loss + alpha * root_mean_square(deformed - truth)
+    def update(loss):
+        optimiser.zero_grad(set_to_none=True)
         loss.backward()
         nn.utils.clip_grad_norm_(network.parameters(), 1.0)
         optimiser.step()
         return loss.item()
 
+    def step_published():
+        moved = source
+        for _ in range(options.iterations):
+            moved = network["rigid"](moved, target)
+            update(root_mean_square(moved - rigid))
+            moved = moved.detach()
+        if alpha > 0.0:
+            some = moved[:, :DECODED_POINTS] + network["nonrigid"](moved, target)
+            update(root_mean_square(some - truth[:, :DECODED_POINTS]))
+
+    def step_flow():
+        moved = source
+        for i in range(options.iterations + 2):
+            reached = moved + network["flow"](moved, target)
+            update(root_mean_square(reached - truth))
+            reached = reached.detach()
+            moved = best_rigid_fit(moved, reached) if i < options.iterations else reached
+
+    step = step_published if pairing == "nearest" else step_flow
     for _ in range(options.steps // 3 + 1):
         step()
     start, start_used = time.perf_counter(), time.process_time()

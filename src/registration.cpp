@@ -152,13 +152,13 @@ Registrar::Implementation::Found Registrar::Implementation::search(const PointCl
   }
   const bool fits = refined && refined->fit > kPoorFit;
 
-  // Rigid module
+  // Rigid stage
   if (settings.runs(Stage::kRigid) && !fits) {
     timed("rigid", stages,
           [&] { rigid = network.estimateRigid(model->sampled.points, target.points); });
   }
 
-  // Non-rigid module, decoded at every point of the organ or where the refinement starts from
+  // Non-rigid stage, decoded at every point of the organ or where the refinement starts from
   const Points& queries = refines ? model->sampled.points : model->vertices;
   displacements.setZero(3, queries.cols());
   if (settings.runs(Stage::kNonRigid) && !fits) {

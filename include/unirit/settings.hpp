@@ -6,15 +6,15 @@
 
 namespace unirit {
 
-/// What of the other cloud the network reads beside a point: in the non-rigid decoder, where the
-/// published network reads the target's row, and in one case in encoders too. Checkpoints hold the
-/// number: new ones come last.
+/// What of the other cloud the network reads beside a point: in the non-rigid decoder of the
+/// published layers, where those read the target's row, or everywhere. Checkpoints hold the number:
+/// new ones come last.
 enum class Pairing {
   kNearest,  ///< offset to the nearest target point: independent of the order of either cloud
   kNone,     ///< nothing, as in the Free Point Transformer
   kRow,      ///< row i of the target, as published; only to reproduce the published tables
-  kOffsets,  ///< as nearest, and in the encoders of the non-rigid module and of a second, fine
-             ///< rigid module the offset to the nearest point of the other cloud
+  kOffsets,  ///< another network, the default: encoders and decoder read offsets to the nearest
+             ///< points, either way, and their means over neighbourhoods
 };
 
 /// The stages of a registration, in their order.
@@ -40,8 +40,8 @@ struct SamplingSettings {
 
 /// How the network is run.
 struct NetworkSettings {
-  int rigid_iterations = 8;             ///< n of the paper's rigid module, the fine one's included
-  Pairing pairing = Pairing::kNearest;  ///< must be the one the weights were trained with
+  int rigid_iterations = 8;             ///< n of the paper's rigid module; of the flow at most
+  Pairing pairing = Pairing::kOffsets;  ///< must be the one the weights were trained with
 };
 
 /// The coherent refinement. Lengths scale with the organ.
@@ -133,7 +133,7 @@ void visitSettings(Settings& settings, Visitor&& visitor) {
           "points in and around a voxel over the median voxel's, at least; 0: off");
   visitor("sampling/points", settings.sampling.points, 64, 16384, "points kept of each cloud");
   visitor("network/rigid_iterations", settings.network.rigid_iterations, 1, 32,
-          "iterations of the rigid module");
+          "iterations of the rigid stage; with pairing offsets at most");
   auto& r = settings.refinement;
   visitor("refinement/pose_iterations", r.pose_iterations, 0, 100,
           "iterations of the pose alone, with few points");

@@ -17,17 +17,17 @@ void append(std::vector<LayerShape>& shapes, const std::string& name, int inputs
 
 std::vector<LayerShape> layerShapes(Pairing pairing) {
   std::vector<LayerShape> shapes;
+  if (pairing == Pairing::kOffsets) {
+    append(shapes, "flow.source_encoder", kFlowInputs, kFlowEncoderWidths);
+    append(shapes, "flow.target_encoder", kFlowTargetInputs, kFlowEncoderWidths);
+    append(shapes, "flow.decoder", kFlowInputs + 2 * kFlowFeatureSize, kFlowDecoderWidths);
+    return shapes;
+  }
   append(shapes, "rigid.source_encoder", 3, kEncoderWidths);
   append(shapes, "rigid.target_encoder", 3, kEncoderWidths);
   append(shapes, "rigid.decoder", 2 * kFeatureSize, kRigidDecoderWidths);
-  if (pairing == Pairing::kOffsets) {
-    append(shapes, "fine.source_encoder", kOffsetInputs, kFineEncoderWidths);
-    append(shapes, "fine.target_encoder", kOffsetInputs, kFineEncoderWidths);
-    append(shapes, "fine.decoder", 2 * kFineEncoderWidths.back(), kFineDecoderWidths);
-  }
-  const int inputs = nonRigidEncoderInputs(pairing);
-  append(shapes, "nonrigid.source_encoder", inputs, kEncoderWidths);
-  append(shapes, "nonrigid.target_encoder", inputs, kEncoderWidths);
+  append(shapes, "nonrigid.source_encoder", 3, kEncoderWidths);
+  append(shapes, "nonrigid.target_encoder", 3, kEncoderWidths);
   append(shapes, "nonrigid.decoder", nonRigidDecoderInputs(pairing), kNonRigidDecoderWidths);
   return shapes;
 }

@@ -7,6 +7,7 @@ namespace unirit {
 namespace {
 
 constexpr int kLastLayer = static_cast<int>(kEncoderWidths.size()) - 1;
+static_assert(kFlowEncoderWidths.size() == kEncoderWidths.size());
 
 const Layer& lastLayer(const Weights& weights, const std::string& name) {
   return weights.layers.at(name + "." + std::to_string(kLastLayer));
@@ -19,16 +20,13 @@ Encoder::Encoder(const Kernels& kernels, const Weights& weights, const std::stri
       layers_(packLayers(kernels, weights, name, 0, kLastLayer - 1, Activation::kRelu)),
       last_(kernels, lastLayer(weights, name), Activation::kRelu) {}
 
-void Encoder::encode(const Points& points, const NearestOffsets* offsets, float* feature,
-                     Workspace& workspace) const {
+void Encoder::encode(const RowsView& points, float* feature, Workspace& workspace) const {
   for (Scratch& scratch : workspace.scratches()) {
     std::fill_n(scratch.maxima.data(), feature_size_, 0.0F);
   }
   const Kernels& kernels = workspace.kernels();
-  workspace.forEachBlock(points.cols(), [&](Scratch& scratch, long begin, long count) {
-    const RowsView input = offsets != nullptr
-                               ? offsets->rows(points, begin, count, scratch, kernels)
-                               : RowsView{points.data() + 3 * begin, 3, count};
+  workspace.forEachBlock(points.count, [&](Scratch& scratch, long begin, long count) {
+    const RowsView input{points.data + points.stride * begin, points.stride, count};
     kernels.denseMaximum(last_.view(), runLayers(kernels, layers_, input, scratch),
                          scratch.maxima.data());
   });

@@ -5,8 +5,6 @@
 #include <vector>
 
 #include "dense_layer.hpp"
-#include "nearest_offsets.hpp"
-#include "unirit/point_cloud.hpp"
 
 namespace unirit {
 
@@ -15,13 +13,10 @@ class Encoder {
  public:
   Encoder(const Kernels& kernels, const Weights& weights, const std::string& name);
 
-  /// Writes the featureSize() numbers of the cloud's feature. `offsets`, to the other cloud, are
-  /// given where the encoder reads them, else null. The last layer's outputs are never stored: each
-  /// block of points only raises the maxima, which a ReLU starts at zero.
-  void encode(const Points& points, const NearestOffsets* offsets, float* feature,
-              Workspace& workspace) const;
-
-  int featureSize() const { return feature_size_; }
+  /// Writes the numbers of a cloud's feature, of a row for each of its points. The
+  /// last layer's outputs are never stored: each block of points only raises the maxima, which a
+  /// ReLU starts at zero.
+  void encode(const RowsView& points, float* feature, Workspace& workspace) const;
 
  private:
   int feature_size_;

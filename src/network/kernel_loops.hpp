@@ -118,26 +118,28 @@ struct Loops {
     }
   }
 
+  /// x, y and z of up to as many queries as there are lanes; the rest are zero.
+  static void loadQueries(const float* queries, long count, Vector (&coordinates)[3]) {
+    float lanes[3][Lanes] = {};
+    for (long lane = 0; lane < count; ++lane) {
+      for (int axis = 0; axis < 3; ++axis) lanes[axis][lane] = queries[3 * lane + axis];
+    }
+    for (int axis = 0; axis < 3; ++axis) coordinates[axis] = load(lanes[axis]);
+  }
+
   /// Exhaustive, one query a lane: at a thousand targets faster than a k-d tree.
   static void nearest(const float* queries, long query_count, const float* targets,
                       long target_count, int* indices) {
     for (long begin = 0; begin < query_count; begin += Lanes) {
       const long lanes = query_count - begin < Lanes ? query_count - begin : Lanes;
-      float lane_queries[3][Lanes] = {};
-      for (long lane = 0; lane < lanes; ++lane) {
-        for (int axis = 0; axis < 3; ++axis) {
-          lane_queries[axis][lane] = queries[3 * (begin + lane) + axis];
-        }
-      }
-      const Vector x = load(lane_queries[0]);
-      const Vector y = load(lane_queries[1]);
-      const Vector z = load(lane_queries[2]);
+      Vector query[3];
+      loadQueries(queries + 3 * begin, lanes, query);
       Vector smallest = __builtin_inff() - Vector{};
       IndexVector index{};
       for (long target = 0; target < target_count; ++target) {
-        const Vector dx = x - targets[3 * target];
-        const Vector dy = y - targets[3 * target + 1];
-        const Vector dz = z - targets[3 * target + 2];
+        const Vector dx = query[0] - targets[3 * target];
+        const Vector dy = query[1] - targets[3 * target + 1];
+        const Vector dz = query[2] - targets[3 * target + 2];
         const Vector distance = dx * dx + dy * dy + dz * dz;
         const IndexVector closer = distance < smallest;
         smallest = closer ? distance : smallest;
@@ -241,8 +243,43 @@ struct Loops {
     }
   }
 
+  /// One query a lane, as in `nearest`.
+  static void neighbourhoodSums(const float* queries, long query_count, const float* points,
+                                const float* values, long point_count, float exponent,
+                                float* sums) {
+    for (long begin = 0; begin < query_count; begin += Lanes) {
+      const long lanes = query_count - begin < Lanes ? query_count - begin : Lanes;
+      Vector query[3];
+      loadQueries(queries + 3 * begin, lanes, query);
+      Vector totals[kNeighbourhoods][kAveraged] = {};
+      for (long point = 0; point < point_count; ++point) {
+        const Vector dx = query[0] - points[3 * point];
+        const Vector dy = query[1] - points[3 * point + 1];
+        const Vector dz = query[2] - points[3 * point + 2];
+        Vector weight = exponential(exponent * (dx * dx + dy * dy + dz * dz));
+#pragma GCC unroll 4
+        for (int size = 0; size < kNeighbourhoods; ++size) {
+#pragma GCC unroll 8
+          for (int k = 0; k < kAveraged; ++k) {
+            totals[size][k] += weight * values[kAveraged * point + k];
+          }
+          weight *= weight;
+          weight *= weight;
+        }
+      }
+      float stored[kNeighbourhoods * kAveraged][Lanes];
+      for (int k = 0; k < kNeighbourhoods * kAveraged; ++k) {
+        store(totals[k / kAveraged][k % kAveraged], stored[k]);
+      }
+      for (long lane = 0; lane < lanes; ++lane) {
+        for (int k = 0; k < kNeighbourhoods * kAveraged; ++k) *sums++ = stored[k][lane];
+      }
+    }
+  }
+
   static constexpr Kernels kernels(InstructionSet instruction_set) {
-    return {instruction_set, kWidth, dense, denseMaximum, nearest, affinities, gather, gaussians};
+    return {instruction_set, kWidth, dense,     denseMaximum,     nearest,
+            affinities,      gather, gaussians, neighbourhoodSums};
   }
 };
 

@@ -37,6 +37,10 @@ struct OrientedPointsView {
 /// Points that a kernel takes together, for every instruction set the same.
 inline constexpr long kPointBlock = 16;
 
+/// Neighbourhoods of a point, each half the size of the one before, and what is averaged over them.
+inline constexpr int kNeighbourhoods = 4;
+inline constexpr int kAveraged = 8;
+
 /// What normals do to the attraction between two points.
 enum class NormalUse {
   kNone,
@@ -84,6 +88,12 @@ struct Kernels {
   /// targets one coordinate an array, in whole blocks of kPointBlock.
   void (*gaussians)(const float* queries, long query_count, const float* const* targets,
                     long target_count, float exponent, float* values);
+
+  /// Sums over points of their kAveraged values, each weighted by e^(exponent * squared distance to
+  /// a query), then by the fourth power of that, the sixteenth ...:
+  /// sums[query][kNeighbourhoods][kAveraged]. Queries and points are x y z, x y z, ...
+  void (*neighbourhoodSums)(const float* queries, long query_count, const float* points,
+                            const float* values, long point_count, float exponent, float* sums);
 };
 
 /// What this processor can run, from the baseline up.

@@ -15,24 +15,41 @@ double multiplyAddsPerRow(int inputs, const Widths& widths) {
   return sum;
 }
 
+double flowMultiplyAdds(double sources, double targets, bool with_savings) {
+  constexpr double kFeatureColumns = 2.0 * kFlowFeatureSize * kFlowDecoderWidths.front();
+  const double point = multiplyAddsPerRow(kFlowInputs, kFlowEncoderWidths) +
+                       multiplyAddsPerRow(kFlowInputs, kFlowDecoderWidths);
+  return point * sources + multiplyAddsPerRow(kFlowTargetInputs, kFlowEncoderWidths) * targets +
+         (with_savings ? 1.0 : sources) * kFeatureColumns;
+}
+
+/// Of a cloud, those that the rigid stage of the flow module reads.
+double rigidPoints(Eigen::Index points) {
+  const Eigen::Index stride = (points + kFlowRigidPoints - 1) / kFlowRigidPoints;
+  return static_cast<double>((points + stride - 1) / stride);
+}
+
 }  // namespace
 
 double multiplyAdds(Eigen::Index source_points, Eigen::Index target_points, int rigid_iterations,
                     Pairing pairing, bool with_savings) {
   const auto sources = static_cast<double>(source_points);
   const auto targets = static_cast<double>(target_points);
-  const int coarse = coarseIterations(pairing, rigid_iterations);
-  const double rigid = multiplyAddsPerRow(3, kEncoderWidths) * (coarse * sources + targets) +
-                       coarse * multiplyAddsPerRow(2 * kFeatureSize, kRigidDecoderWidths);
-  const double fine = multiplyAddsPerRow(kOffsetInputs, kFineEncoderWidths) * (sources + targets) +
-                      multiplyAddsPerRow(2 * kFineEncoderWidths.back(), kFineDecoderWidths);
+  if (pairing == Pairing::kOffsets) {
+    return rigid_iterations * flowMultiplyAdds(rigidPoints(source_points),
+                                               rigidPoints(target_points), with_savings) +
+           kFlowSteps * flowMultiplyAdds(sources, targets, with_savings);
+  }
+  const double rigid =
+      multiplyAddsPerRow(3, kEncoderWidths) * (rigid_iterations * sources + targets) +
+      rigid_iterations * multiplyAddsPerRow(2 * kFeatureSize, kRigidDecoderWidths);
 
   constexpr double kFeatureColumns = 2.0 * kFeatureSize * kNonRigidDecoderWidths.front();
   const double decoder = multiplyAddsPerRow(nonRigidDecoderInputs(pairing), kNonRigidDecoderWidths);
-  const double encoder = multiplyAddsPerRow(nonRigidEncoderInputs(pairing), kEncoderWidths);
+  const double encoder = multiplyAddsPerRow(3, kEncoderWidths);
   const double nonrigid = encoder * (sources + targets) + sources * (decoder - kFeatureColumns) +
                           (with_savings ? 1.0 : sources) * kFeatureColumns;
-  return rigid + (rigid_iterations - coarse) * fine + nonrigid;
+  return rigid + nonrigid;
 }
 
 }  // namespace unirit

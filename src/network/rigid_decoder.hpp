@@ -8,10 +8,11 @@
 
 namespace unirit {
 
-/// A step of the rigid module: p becomes rotation * p + translation.
+/// A step of the rigid stage: p becomes rotation * p + translation.
 struct RigidStep {
   Eigen::Quaternionf rotation;
   Eigen::Vector3f translation;
+  bool last = false;  ///< nothing is left that another would gain
 };
 
 /// Reads a step off the features of the moved source and the target.

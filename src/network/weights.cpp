@@ -212,20 +212,28 @@ void writeWeights(const Weights& weights, const std::string& path) {
 }
 
 Weights randomWeights(Pairing pairing, unsigned seed) {
-  constexpr double kLastLayerScale = 0.05;
+  constexpr double kLastLayerScale = 0.05, kLastFlowScale = 0.01;
   constexpr float kOffsetScale = 10.0F;  // offsets are shorter than points by as much
   Random random(seed);
   Weights weights;
   weights.pairing = pairing;
   for (const LayerShape& shape : layerShapes(pairing)) {
-    const bool last = shape.outputs == kRigidDecoderWidths.back() ||
-                      shape.outputs == kNonRigidDecoderWidths.back();
-    const double deviation = std::sqrt(2.0 / shape.inputs) * (last ? kLastLayerScale : 1.0);
+    double scale = 1.0;
+    if (shape.outputs == kFlowDecoderWidths.back()) scale = kLastFlowScale;
+    if (shape.outputs == kRigidDecoderWidths.back() ||
+        shape.outputs == kNonRigidDecoderWidths.back()) {
+      scale = kLastLayerScale;
+    }
+    const double deviation = scale * std::sqrt(2.0 / shape.inputs);
     Layer& layer = weights.layers[shape.name];
     layer.weight = Eigen::MatrixXf::NullaryExpr(shape.outputs, shape.inputs, [&] {
       return static_cast<float>(deviation * random.normal());
     });
-    if (shape.inputs == kOffsetInputs) layer.weight.rightCols(3) *= kOffsetScale;
+    if (shape.name == "flow.source_encoder.0" || shape.name == "flow.decoder.0") {
+      constexpr int kOffsetColumns = 4 * kFlowVectors;
+      layer.weight.middleCols(kFlowInputs - kOffsetColumns, kOffsetColumns) *= kOffsetScale;
+    }
+    if (shape.name == "flow.target_encoder.0") layer.weight.rightCols(3) *= kOffsetScale;
     layer.bias = Eigen::VectorXf::Zero(shape.outputs);
   }
   for (auto& [name, layer] : weights.layers) {

@@ -4,6 +4,7 @@
 #include <stdexcept>
 
 #include "max_linear.hpp"
+#include "surroundings.hpp"
 
 namespace unirit::training {
 namespace {
@@ -16,11 +17,6 @@ std::vector<int> stack(int inputs, const std::array<int, Size>& outputs) {
   return widths;
 }
 
-/// What an encoder of so many inputs reads of `points` beside the other cloud: [B, N, inputs].
-torch::Tensor encoderInput(int inputs, const torch::Tensor& points, const torch::Tensor& other) {
-  return inputs == 3 ? points : torch::cat({points, offsets(points, other)}, 2);
-}
-
 /// Unit quaternions w x y z, [B, 4], to rotations, [B, 3, 3].
 torch::Tensor rotationOf(const torch::Tensor& quaternion) {
   const auto parts = torch::nn::functional::normalize(quaternion).unbind(1);
@@ -31,6 +27,14 @@ torch::Tensor rotationOf(const torch::Tensor& quaternion) {
                     2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)},
                    1);
   return rows.view({-1, 3, 3});
+}
+
+/// What the rigid stage of the flow module reads of clouds, [B, N, 3].
+torch::Tensor thinned(const torch::Tensor& points) {
+  const std::int64_t stride = (points.size(1) + kFlowRigidPoints - 1) / kFlowRigidPoints;
+  if (stride == 1) return points;
+  const auto order = points.select(2, 0).argsort(1, false).slice(1, 0, c10::nullopt, stride);
+  return points.gather(1, order.unsqueeze(2).expand({-1, -1, 3}));
 }
 
 }  // namespace
@@ -70,28 +74,34 @@ torch::Tensor Pose::apply(const torch::Tensor& points) const {
   return torch::baddbmm(translation.unsqueeze(1), points, rotation.transpose(1, 2));
 }
 
-RigidModuleImpl::RigidModuleImpl(const std::vector<int>& encoder, const std::vector<int>& decoder)
-    : inputs_(encoder.front()),
-      source_encoder_(register_module("source_encoder", Encoder(encoder))),
-      target_encoder_(register_module("target_encoder", Encoder(encoder))),
-      decoder_(register_module("decoder", Perceptron(decoder, true))) {}
+Pose bestRigidFit(const torch::Tensor& from, const torch::Tensor& to) {
+  const auto from_centre = from.mean(1, true), to_centre = to.mean(1, true);
+  const auto covariance = torch::bmm((from - from_centre).transpose(1, 2), to - to_centre);
+  const auto [u, values, v_transposed] = torch::linalg_svd(covariance.to(torch::kDouble), false);
+  auto v = v_transposed.transpose(1, 2).clone();
+  v.select(2, 2).mul_(torch::linalg_det(torch::bmm(u, v_transposed)).sign().unsqueeze(1));
+  const auto rotation = torch::bmm(v, u.transpose(1, 2)).to(from.dtype());
+  return {rotation, (to_centre - torch::bmm(from_centre, rotation.transpose(1, 2))).squeeze(1)};
+}
+
+RigidModuleImpl::RigidModuleImpl()
+    : source_encoder_(register_module("source_encoder", Encoder(stack(3, kEncoderWidths)))),
+      target_encoder_(register_module("target_encoder", Encoder(stack(3, kEncoderWidths)))),
+      decoder_(register_module("decoder",
+                               Perceptron(stack(2 * kFeatureSize, kRigidDecoderWidths), true))) {}
 
 Pose RigidModuleImpl::forward(const torch::Tensor& moved_source, const torch::Tensor& target,
                               torch::Tensor& target_feature) {
-  if (!target_feature.defined() || inputs_ == kOffsetInputs) {
-    target_feature = target_encoder_->forward(encoderInput(inputs_, target, moved_source));
-  }
-  const auto source_feature = source_encoder_->forward(encoderInput(inputs_, moved_source, target));
+  if (!target_feature.defined()) target_feature = target_encoder_->forward(target);
+  const auto source_feature = source_encoder_->forward(moved_source);
   const auto output = decoder_->forward(torch::cat({source_feature, target_feature}, 1));
   return {rotationOf(output.slice(1, 0, 4)), output.slice(1, 4, 7)};
 }
 
 NonRigidModuleImpl::NonRigidModuleImpl(Pairing pairing)
     : pairing_(pairing),
-      source_encoder_(register_module(
-          "source_encoder", Encoder(stack(nonRigidEncoderInputs(pairing), kEncoderWidths)))),
-      target_encoder_(register_module(
-          "target_encoder", Encoder(stack(nonRigidEncoderInputs(pairing), kEncoderWidths)))),
+      source_encoder_(register_module("source_encoder", Encoder(stack(3, kEncoderWidths)))),
+      target_encoder_(register_module("target_encoder", Encoder(stack(3, kEncoderWidths)))),
       decoder_(register_module(
           "decoder",
           Perceptron(stack(nonRigidDecoderInputs(pairing), kNonRigidDecoderWidths), true))) {}
@@ -99,13 +109,9 @@ NonRigidModuleImpl::NonRigidModuleImpl(Pairing pairing)
 torch::Tensor NonRigidModuleImpl::forward(const torch::Tensor& moved_source,
                                           const torch::Tensor& target,
                                           c10::optional<std::int64_t> points) {
-  const int inputs = nonRigidEncoderInputs(pairing_);
-  const auto source_input = encoderInput(inputs, moved_source, target);
   const auto features =
-      torch::cat({source_encoder_->forward(source_input),
-                  target_encoder_->forward(encoderInput(inputs, target, moved_source))},
-                 1);
-  torch::Tensor local = source_input;  // what the decoder reads of each point
+      torch::cat({source_encoder_->forward(moved_source), target_encoder_->forward(target)}, 1);
+  torch::Tensor local = moved_source;  // what the decoder reads of each point
   if (pairing_ == Pairing::kRow) local = torch::cat({moved_source, target}, 2);
   if (pairing_ == Pairing::kNearest) {
     local = torch::cat({moved_source, offsets(moved_source, target)}, 2);
@@ -121,31 +127,69 @@ torch::Tensor NonRigidModuleImpl::forward(const torch::Tensor& moved_source,
   return decoder_->continueFrom(point + global.unsqueeze(1));
 }
 
-UniritImpl::UniritImpl(Pairing pairing)
-    : rigid(register_module("rigid", RigidModule(stack(3, kEncoderWidths),
-                                                 stack(2 * kFeatureSize, kRigidDecoderWidths)))),
-      nonrigid(register_module("nonrigid", NonRigidModule(pairing))),
-      pairing_(pairing) {
-  if (pairing != Pairing::kOffsets) return;
-  fine = register_module("fine",
-                         RigidModule(stack(kOffsetInputs, kFineEncoderWidths),
-                                     stack(2 * kFineEncoderWidths.back(), kFineDecoderWidths)));
+FlowModuleImpl::FlowModuleImpl()
+    : source_encoder_(
+          register_module("source_encoder", Encoder(stack(kFlowInputs, kFlowEncoderWidths)))),
+      target_encoder_(
+          register_module("target_encoder", Encoder(stack(kFlowTargetInputs, kFlowEncoderWidths)))),
+      decoder_(register_module(
+          "decoder",
+          Perceptron(stack(kFlowInputs + 2 * kFlowFeatureSize, kFlowDecoderWidths), true))) {}
+
+torch::Tensor FlowModuleImpl::forward(const torch::Tensor& moved_source,
+                                      const torch::Tensor& target) {
+  const Surroundings read = surroundings(moved_source, target);
+  const auto features = torch::cat(
+      {source_encoder_->forward(read.of_source), target_encoder_->forward(read.of_target)}, 1);
+  const auto first = decoder_->layer(0);
+  const auto columns = first->weight.split_with_sizes({kFlowInputs, 2 * kFlowFeatureSize}, 1);
+  const auto global = torch::linear(features, columns[1], first->bias);
+  const auto output =
+      decoder_->continueFrom(torch::linear(read.of_source, columns[0]) + global.unsqueeze(1));
+  return output.slice(2, 0, 3) + (output.slice(2, 3).unsqueeze(3) * read.vectors).sum(2);
+}
+
+UniritImpl::UniritImpl(Pairing pairing) : pairing_(pairing) {
+  if (pairing == Pairing::kOffsets) {
+    flow = register_module("flow", FlowModule());
+  } else {
+    rigid = register_module("rigid", RigidModule());
+    nonrigid = register_module("nonrigid", NonRigidModule(pairing));
+  }
 }
 
 torch::Tensor UniritImpl::moveRigidly(const torch::Tensor& source, const torch::Tensor& target,
                                       int iterations) {
-  const int coarse = coarseIterations(pairing_, iterations);
   torch::Tensor moved = source, target_feature;
+  if (!flow) {
+    for (int i = 0; i < iterations; ++i) {
+      moved = rigid->forward(moved, target, target_feature).apply(moved);
+    }
+    return moved;
+  }
+  const torch::Tensor some_of_target = thinned(target);
+  torch::Tensor some = thinned(source);
+  torch::Tensor going_on = torch::ones({source.size(0), 1, 1}, source.options()).to(torch::kBool);
   for (int i = 0; i < iterations; ++i) {
-    auto& module = i < coarse ? rigid : fine;
-    moved = module->forward(moved, target, target_feature).apply(moved);
+    const Pose step = bestRigidFit(some, some + flow->forward(some, some_of_target));
+    const auto reached = step.apply(some);
+    const auto motion = (reached - some).square().sum(2, true).mean(1, true).sqrt();
+    moved = torch::where(going_on, step.apply(moved), moved);
+    some = torch::where(going_on, reached, some);
+    going_on = going_on & (motion >= kFlowConverged);
   }
   return moved;
 }
 
+torch::Tensor UniritImpl::deform(const torch::Tensor& moved_source, const torch::Tensor& target) {
+  if (!flow) return moved_source + nonrigid->forward(moved_source, target);
+  torch::Tensor moved = moved_source;
+  for (int i = 0; i < kFlowSteps; ++i) moved = moved + flow->forward(moved, target);
+  return moved;
+}
+
 void UniritImpl::setWeights(const Weights& weights) {
-  const bool widened = weights.pairing == Pairing::kNearest && pairing_ == Pairing::kOffsets;
-  if (weights.pairing != pairing_ && !widened) {
+  if (weights.pairing != pairing_) {
     throw std::invalid_argument(std::string("weights: their pairing is ") +
                                 toString(weights.pairing) + ", the network's " +
                                 toString(pairing_));
@@ -160,10 +204,8 @@ void UniritImpl::setWeights(const Weights& weights) {
     using RowMajor = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
     RowMajor weight = layer->second.weight;
     Eigen::VectorXf bias = layer->second.bias;
-    parameters[shape.name + ".weight"]
-        .zero_()
-        .slice(1, 0, shape.inputs)
-        .copy_(torch::from_blob(weight.data(), {shape.outputs, shape.inputs}));
+    parameters[shape.name + ".weight"].copy_(
+        torch::from_blob(weight.data(), {shape.outputs, shape.inputs}));
     parameters[shape.name + ".bias"].copy_(torch::from_blob(bias.data(), {shape.outputs}));
   }
 }
@@ -181,16 +223,6 @@ Weights UniritImpl::weights() const {
         Eigen::Map<const Eigen::VectorXf>(bias.data_ptr<float>(), shape.outputs)};
   }
   return weights;
-}
-
-torch::Tensor offsets(const torch::Tensor& from, const torch::Tensor& to) {
-  torch::Tensor index;
-  {
-    const torch::NoGradGuard no_grad;
-    const at::NoTF32Guard no_tf32;  // its ten bits do not tell near points apart
-    index = torch::cdist(from, to).argmin(2);
-  }
-  return to.gather(1, index.unsqueeze(2).expand({-1, -1, 3})) - from;
 }
 
 }  // namespace unirit::training

@@ -48,19 +48,20 @@ struct Pose {
   torch::Tensor apply(const torch::Tensor& points) const;  ///< [B, N, 3] -> [B, N, 3]
 };
 
-/// One iteration of the paper's rigid module, or of the fine one. Encoders of six inputs read the
-/// way to the other cloud beside each point.
+/// The rigid transform that fits a batch of points to others best, row by row, [B, N, 3] each
+/// (Umeyama 1991).
+Pose bestRigidFit(const torch::Tensor& from, const torch::Tensor& to);
+
+/// One iteration of the paper's rigid module.
 class RigidModuleImpl : public torch::nn::Module {
  public:
-  RigidModuleImpl(const std::vector<int>& encoder, const std::vector<int>& decoder);
+  RigidModuleImpl();
 
-  /// `target_feature` starts undefined for each target; it is computed in the first iteration, and
-  /// in all where it changes with the source's pose.
+  /// `target_feature` starts undefined for each target; it is computed in the first iteration.
   Pose forward(const torch::Tensor& moved_source, const torch::Tensor& target,
                torch::Tensor& target_feature);
 
  private:
-  int inputs_;  // of the encoders
   Encoder source_encoder_, target_encoder_;
   Perceptron decoder_;
 };
@@ -81,22 +82,36 @@ class NonRigidModuleImpl : public torch::nn::Module {
 };
 TORCH_MODULE(NonRigidModule);
 
+/// The module of pairing offsets, of both stages: the flow of the moved source, [B, N, 3].
+class FlowModuleImpl : public torch::nn::Module {
+ public:
+  FlowModuleImpl();
+  torch::Tensor forward(const torch::Tensor& moved_source, const torch::Tensor& target);
+
+ private:
+  Encoder source_encoder_, target_encoder_;
+  Perceptron decoder_;
+};
+TORCH_MODULE(FlowModule);
+
 /// The whole of UniRiT, with the layer names of the weights file.
 class UniritImpl : public torch::nn::Module {
  public:
   explicit UniritImpl(Pairing pairing);
 
-  RigidModule rigid;
-  RigidModule fine{nullptr};  ///< with pairing offsets alone
-  NonRigidModule nonrigid;
+  RigidModule rigid{nullptr};  ///< these two with every pairing but offsets
+  NonRigidModule nonrigid{nullptr};
+  FlowModule flow{nullptr};  ///< with pairing offsets alone
 
-  /// The source after so many iterations of the rigid modules.
+  /// The source after so many iterations of the rigid stage, of the flow module at most.
   torch::Tensor moveRigidly(const torch::Tensor& source, const torch::Tensor& target,
                             int iterations);
 
+  /// That and the non-rigid stage.
+  torch::Tensor deform(const torch::Tensor& moved_source, const torch::Tensor& target);
+
   /// Replaces every parameter; throws std::invalid_argument where the pairing is another or a layer
-  /// is missing. Weights of pairing nearest serve pairing offsets, too: the fine module keeps its
-  /// own, and what the other encoders read beside a point counts for nothing until it is trained.
+  /// is missing.
   void setWeights(const Weights& weights);
 
   /// The parameters as a weights file holds them, without metadata.
@@ -108,8 +123,5 @@ class UniritImpl : public torch::nn::Module {
   Pairing pairing_;
 };
 TORCH_MODULE(Unirit);
-
-/// From each point to its nearest neighbour in `to`: [B, N, 3].
-torch::Tensor offsets(const torch::Tensor& from, const torch::Tensor& to);
 
 }  // namespace unirit::training

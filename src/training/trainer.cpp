@@ -8,6 +8,7 @@
 #include <thread>
 
 #include "checkpoint.hpp"
+#include "surroundings.hpp"
 
 namespace unirit::training {
 namespace {
@@ -42,27 +43,32 @@ Batch slice(const Batch& batch, std::int64_t first, std::int64_t last) {
   return transformed(batch, [&](const torch::Tensor& t) { return t.slice(0, first, last); });
 }
 
-/// Of a rigid module: grows from one to `iterations`.
-int iterationsAt(int iterations, const TrainingSettings& settings, std::int64_t step) {
+/// Rigid iterations: grow from one to all.
+int iterationsAt(const TrainingSettings& settings, std::int64_t step) {
   const double growth = static_cast<double>(step) / (kGrowthShare * settings.steps);
-  return std::min(iterations, 1 + static_cast<int>(growth * iterations));
+  return std::min(settings.iterations, 1 + static_cast<int>(growth * settings.iterations));
 }
-
-enum class Module { kRigid, kFine, kNonRigid };
 
 struct Outcome {
   torch::Tensor loss;
-  torch::Tensor moved;  // the source, detached; of the rigid modules alone
+  torch::Tensor moved;  // the source, detached; undefined where nothing follows
 };
 
-/// One pass of a module from where batch.source stands, and its loss. That of the non-rigid module
-/// is taken at some points of each pair: its decoder is most of the work.
-Outcome pass(Unirit& model, const Batch& batch, const TrainingSettings& settings, Module module) {
-  if (module != Module::kNonRigid) {
-    auto& rigid = module == Module::kRigid ? model->rigid : model->fine;
+/// One pass of the rigid or the non-rigid stage from where batch.source stands, and its loss. That
+/// of the published non-rigid module is taken at some points of each pair: its decoder is most of
+/// the work.
+Outcome pass(Unirit& model, const Batch& batch, const TrainingSettings& settings, Stage stage) {
+  const bool rigid = stage == Stage::kRigid;
+  if (model->flow) {
+    const auto moved = batch.source + model->flow->forward(batch.source, batch.target);
+    const auto reached = moved.detach();
+    return {distance(settings.loss, moved, batch.truth, batch.target),
+            rigid ? bestRigidFit(batch.source, reached).apply(batch.source) : reached};
+  }
+  if (rigid) {
     torch::Tensor target_feature;
     const auto moved =
-        rigid->forward(batch.source, batch.target, target_feature).apply(batch.source);
+        model->rigid->forward(batch.source, batch.target, target_feature).apply(batch.source);
     return {distance(settings.loss, moved, batch.rigid, batch.target), moved.detach()};
   }
   const std::int64_t points = std::min(settings.decoded_points, batch.source.size(1));
@@ -84,63 +90,52 @@ void forEachPart(std::int64_t pairs, std::int64_t parts, const Work& work) {
   for (std::thread& thread : threads) thread.join();
 }
 
-/// Updates a module's weights, unless they are kept, by one pass over the batch, moves the batch's
-/// source by it where it moves all of it, and returns the loss.
+/// Updates a stage's weights by one pass over the batch, moves the batch's source by it and returns
+/// the loss.
 torch::Tensor update(Unirit& model, torch::optim::Adam& optimiser, Batch& batch,
-                     const TrainingSettings& settings, Module module) {
-  const bool keeps = module == Module::kRigid && settings.keep_rigid;
+                     const TrainingSettings& settings, Stage stage) {
   const auto parameters = model->parameters();
   const std::int64_t pairs = batch.source.size(0);
   const std::int64_t parts = std::min<std::int64_t>(settings.threads, pairs);
   std::vector<torch::Tensor> losses(static_cast<std::size_t>(parts)), moved(losses.size());
   std::vector<torch::autograd::variable_list> gradients(losses.size());
   forEachPart(pairs, parts, [&](std::int64_t part, std::int64_t first, std::int64_t last) {
-    const torch::AutoGradMode with_gradients(!keeps);
     const double share = static_cast<double>(last - first) / static_cast<double>(pairs);
-    const Outcome outcome = pass(model, slice(batch, first, last), settings, module);
+    const Outcome outcome = pass(model, slice(batch, first, last), settings, stage);
     const auto loss = share * outcome.loss;
     const auto slot = static_cast<std::size_t>(part);
     losses[slot] = loss.detach();
     moved[slot] = outcome.moved;
-    if (!keeps) gradients[slot] = torch::autograd::grad({loss}, parameters, {}, {}, false, true);
+    gradients[slot] = torch::autograd::grad({loss}, parameters, {}, {}, false, true);
   });
-  if (module != Module::kNonRigid) batch.source = torch::cat(moved);
-  const auto loss = torch::stack(losses).sum();
-  if (keeps) return loss;
+  if (moved.front().defined()) batch.source = torch::cat(moved);
 
   for (std::size_t i = 0; i < parameters.size(); ++i) {
     auto& sum = parameters[i].mutable_grad();
-    sum = gradients.front()[i];  // undefined in the other modules: left as they are
+    sum = gradients.front()[i];  // undefined in the other module: left as it is
     if (!sum.defined()) continue;
     for (std::size_t part = 1; part < gradients.size(); ++part) sum.add_(gradients[part][i]);
   }
   torch::nn::utils::clip_grad_norm_(parameters, kLargestGradient);
   optimiser.step();
-  return loss;
+  return torch::stack(losses).sum();
 }
 
-/// One step: an update for every iteration of the rigid modules, each on the output of the one
-/// before, so that it has seen what it will be given, then one of the non-rigid module. They share
-/// no weights, what passes between them is detached and Adam does not see a loss's scale, so alpha
-/// between 0 and 1 weighs only what is returned, the paper's L_total. A rigid module that is kept
-/// is passed over in some of the steps: from its outputs alone the fine one does not begin to
-/// learn.
+/// One step: an update for every iteration of the rigid stage, each on the output of the one
+/// before, so that it has seen what it will be given, then those of the non-rigid stage. What
+/// passes between them is detached and Adam does not see a loss's scale, so alpha between 0 and 1
+/// weighs only what is returned, the paper's L_total.
 torch::Tensor learn(Unirit& model, torch::optim::Adam& optimiser, Batch batch,
                     const TrainingSettings& settings, std::int64_t step) {
   const double alpha = step < settings.rigid_steps ? 0.0 : settings.alpha;
   torch::Tensor loss = torch::zeros({}, batch.source.options());
-  if (alpha < 1.0) {
-    const int all = coarseIterations(model->pairing(), settings.iterations);
-    const int coarse = settings.keep_rigid ? static_cast<int>(step % (all + 1))
-                                           : iterationsAt(all, settings, step);
-    const int fine = iterationsAt(settings.iterations - all, settings, step);
-    for (int i = 0; i < coarse + fine; ++i) {
-      loss +=
-          update(model, optimiser, batch, settings, i < coarse ? Module::kRigid : Module::kFine);
+  const auto add = [&](Stage stage, int passes, double weight) {
+    for (int i = 0; i < passes; ++i) {
+      loss += weight / passes * update(model, optimiser, batch, settings, stage);
     }
-    loss *= (1.0 - alpha) / (coarse + fine);
-  }
-  if (alpha > 0.0) loss += alpha * update(model, optimiser, batch, settings, Module::kNonRigid);
+  };
+  if (alpha < 1.0) add(Stage::kRigid, iterationsAt(settings, step), 1.0 - alpha);
+  if (alpha > 0.0) add(Stage::kNonRigid, model->flow ? kFlowSteps : 1, alpha);
   return loss;
 }
 
@@ -174,7 +169,7 @@ ValidationErrors validate(Unirit& model, const ValidationSet& set,
     const auto moved = model->moveRigidly(part.source, part.target,
                                           settings.alpha < 1.0 ? kValidationIterations : 0);
     rigid += (rootMeanSquare(moved - part.rigid) * part.scale).sum().item<double>();
-    const auto deformed = moved + model->nonrigid->forward(moved, part.target);
+    const auto deformed = model->deform(moved, part.target);
     final += (rootMeanSquare(deformed - part.truth) * part.scale).sum().item<double>();
   }
   return {set.protocol, rigid / static_cast<double>(count), final / static_cast<double>(count)};

@@ -12,7 +12,7 @@
 namespace unirit::training {
 
 enum class Loss {
-  kSupervised,  ///< RMS to the true position (rigid module: to the best rigid fit's)
+  kSupervised,  ///< RMS to the true position (published rigid module: to the best rigid fit's)
   kPaper,       ///< one-sided nearest-neighbour RMS, the paper's L_gl and L_rd
 };
 
@@ -20,13 +20,12 @@ struct TrainingSettings {
   BatchSettings batch;
   Pairing pairing = NetworkSettings().pairing;
   Loss loss = Loss::kSupervised;
-  double alpha = 0.5;  ///< weight of L_gl in the paper's L_total; 0 and 1 leave modules as they are
-  int iterations = 4;  ///< of the rigid modules while training, grown from 1
-  bool keep_rigid = false;           ///< the first rigid module's weights stay as they are
+  double alpha = 0.5;  ///< weight of L_gl in the paper's L_total; 0 and 1 leave a stage out
+  int iterations = 4;  ///< of the rigid stage while training, grown from 1
   std::int64_t decoded_points = 64;  ///< of each pair, whose displacement is learnt from
-  double learning_rate = 1e-3;       ///< Adam's; falls to a hundredth along a cosine
+  double learning_rate = 5e-4;       ///< Adam's; falls to a hundredth along a cosine
   std::int64_t steps = 20000;
-  std::int64_t rigid_steps = 0;  ///< of them, the first ones, that train the rigid modules alone
+  std::int64_t rigid_steps = 0;  ///< of them, the first ones, that train by the rigid stage alone
   std::int64_t report_every = 100;
   std::int64_t save_every = 500;
   std::uint64_t seed = 1;
@@ -38,7 +37,7 @@ struct TrainingSettings {
 /// Errors on the pairs of a protocol, averaged over pairs.
 struct ValidationErrors {
   Protocol protocol = Protocol::kCaseB;
-  double rigid = 0.0;  ///< rigid module's output to the best rigid fit, RMS [m]
+  double rigid = 0.0;  ///< rigid stage's output to the best rigid fit, RMS [m]
   double final = 0.0;  ///< whole network's output to the truth, RMS [m]
 };
 

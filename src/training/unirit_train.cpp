@@ -84,15 +84,14 @@ void addOptions(CLI::App& app, Options& options) {
                  "Folder for checkpoint.pt, curves.csv and unirit.safetensors; a checkpoint found "
                  "there is resumed")
       ->required();
-  app.add_option("--start-from", options.start_from,
-                 "Weights file to start from (else He); for pairing offsets one of pairing nearest "
-                 "serves, too");
+  app.add_option("--start-from", options.start_from, "Weights file to start from (else He)");
   app.add_option("--method", options.method,
                  "unirit, or fpt: the non-rigid module alone, without pairing (Free Point "
                  "Transformer)")
       ->check(CLI::IsMember({"unirit", "fpt"}))
       ->capture_default_str();
-  app.add_option("--pairing", options.pairing, "nearest, offsets, none or row")
+  app.add_option("--pairing", options.pairing,
+                 "offsets: the flow module; nearest, none or row: the published modules")
       ->capture_default_str();
   app.add_option("--target", options.target,
                  "What the target's points are: resampled on the deformed surface, or paired, the "
@@ -103,23 +102,21 @@ void addOptions(CLI::App& app, Options& options) {
       ->check(CLI::IsMember({"supervised", "paper"}))
       ->capture_default_str();
   app.add_option("--alpha", training.alpha,
-                 "Weight of the global loss in the loss shown; 0 trains the rigid modules alone, 1 "
-                 "the non-rigid module alone")
+                 "Weight of the global loss in the loss shown; 0 trains by the rigid stage alone, 1 "
+                 "by the non-rigid stage alone")
       ->check(CLI::Range(0.0, 1.0))
       ->capture_default_str();
   app.add_option("--iterations", training.iterations, "Rigid iterations while training")
       ->check(CLI::Range(1, 32))
       ->capture_default_str();
-  app.add_flag(
-      "--keep-rigid", training.keep_rigid,
-      "The rigid module's weights stay as they are: for pairing offsets, from trained ones");
   app.add_option("--decoded-points", training.decoded_points,
-                 "Points of each pair whose displacement the non-rigid module learns from")
+                 "Points of each pair whose displacement the published non-rigid module learns "
+                 "from; the flow module learns from all")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
   app.add_option("--steps", training.steps)->check(CLI::PositiveNumber)->capture_default_str();
   app.add_option("--rigid-steps", training.rigid_steps,
-                 "The first of them, that train the rigid modules alone")
+                 "The first of them, that train by the rigid stage alone")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
   app.add_option("--batch", batch.pairs, "Pairs a step")
@@ -225,21 +222,6 @@ void printProgress(const Progress& p) {
   std::fflush(stdout);
 }
 
-/// Refuses what would run a module that was never trained.
-void requireSense(const Options& options) {
-  const TrainingSettings& training = options.training;
-  const bool offsets = training.pairing == Pairing::kOffsets;
-  if (offsets && training.alpha < 1.0 &&
-      coarseIterations(training.pairing, training.iterations) == training.iterations) {
-    throw std::runtime_error("--iterations: too few to train the fine module of pairing offsets");
-  }
-  if (!training.keep_rigid) return;
-  if (!offsets) throw std::runtime_error("--keep-rigid: for pairing offsets alone");
-  if (options.start_from.empty()) {
-    throw std::runtime_error("--keep-rigid: needs trained weights, see --start-from");
-  }
-}
-
 void run(Options& options) {
   TrainingSettings& training = options.training;
   if (options.method == "fpt") {
@@ -258,7 +240,6 @@ void run(Options& options) {
     at::globalContext().setAllowTF32CuBLAS(true);  // ten mantissa bits, several times as fast
   }
   if (training.threads > 1) torch::set_num_threads(1);
-  requireSense(options);
   const std::filesystem::path output = options.output;
   requirePlaceFor((output / "unirit.safetensors").string());
   Unirit model(training.pairing);

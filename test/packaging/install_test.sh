@@ -28,7 +28,7 @@ isPlugin() {
 
 hasFiles() {
   local file
-  for file in share/unirit/{models/unirit.safetensors,config/unirit.yaml,rviz/demo.rviz} \
+  for file in share/unirit/{models/{unirit,unirit_published}.safetensors,config/unirit.yaml,rviz/demo.rviz} \
     share/unirit/launch/{registration,replay,demo}.launch include/unirit/registration.hpp; do
     [[ -s $prefix/$file ]] || { echo "$file is missing"; return 1; }
   done

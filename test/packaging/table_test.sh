@@ -98,10 +98,6 @@ claim "unirit_pairs names a broken mesh" \
 touch file
 claim "unirit_train refuses an output that is a file" \
   refuses "file/unirit.safetensors cannot be written" unirit_train --phantoms 1 --output file
-claim "unirit_train refuses to keep a module that nobody trained" \
-  refuses "needs trained weights" unirit_train --phantoms 1 --output out --pairing offsets --keep-rigid
-claim "unirit_train refuses to leave the fine module untrained" \
-  refuses "too few to train" unirit_train --phantoms 1 --output out --pairing offsets --iterations 2
 claim "unirit_train leaves out a mesh without area" \
   refuses "left out: liver flat_liver: cannot be deformed" unirit_train --data flat --output out
 claim "unirit_pairs refuses an output below a file" \

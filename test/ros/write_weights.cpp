@@ -10,9 +10,7 @@ int main(int argc, char** argv) {
   if (argc != 2) return 2;
   try {
     unirit::Weights weights = unirit::randomWeights(unirit::NetworkSettings().pairing, 1);
-    for (const char* last : {"rigid.decoder.5", "nonrigid.decoder.5"}) {
-      weights.layers.at(last).weight *= 0.02F;
-    }
+    weights.layers.at("flow.decoder.3").weight *= 0.02F;
     unirit::writeWeights(weights, argv[1]);
     return 0;
   } catch (const std::exception& error) {

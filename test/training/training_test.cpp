@@ -7,6 +7,7 @@
 
 #include "max_linear.hpp"
 #include "shapes.hpp"
+#include "surroundings.hpp"
 #include "trainer.hpp"
 #include "unirit/simulation/phantom.hpp"
 
@@ -88,32 +89,58 @@ TEST(MaxLinear, HasTheValueAndGradientsOfTheDenseOperation) {
 }
 
 TEST(Model, WeightsRoundTrip) {
-  const Weights weights = randomWeights(Pairing::kNearest, 2);
+  for (const Pairing pairing : {Pairing::kNearest, Pairing::kOffsets}) {
+    const Weights weights = randomWeights(pairing, 2);
+    Unirit model(pairing);
+    model->setWeights(weights);
+    EXPECT_EQ(difference(weights, model->weights()), 0.0);
+  }
+}
+
+TEST(Model, RefusesWeightsThatDoNotFit) {
   Unirit model(Pairing::kNearest);
-  model->setWeights(weights);
-  EXPECT_EQ(difference(weights, model->weights()), 0.0);
-  Weights incomplete = weights;
+  Weights incomplete = randomWeights(Pairing::kNearest, 2);
   incomplete.layers.erase("rigid.decoder.0");
   EXPECT_THROW(model->setWeights(incomplete), std::invalid_argument);
   EXPECT_THROW(model->setWeights(randomWeights(Pairing::kNone, 2)), std::invalid_argument);
 }
 
-TEST(Model, WeightsOfPairingNearestDoTheSameWithPairingOffsets) {
+TEST(Model, ReadsTheSurroundingsAlikeOnEveryDevice) {
+  torch::manual_seed(1);
+  const auto source = 0.5 * torch::randn({2, 50, 3}), target = 0.5 * torch::randn({2, 37, 3});
+  const Surroundings a = surroundings(source, target), b = onAnyDevice(source, target);
+  EXPECT_TRUE(torch::allclose(a.of_source, b.of_source, 1e-4, 1e-5));
+  EXPECT_TRUE(torch::allclose(a.vectors, b.vectors, 1e-4, 1e-5));
+  EXPECT_TRUE(torch::allclose(a.of_target, b.of_target, 1e-4, 1e-5));
+}
+
+TEST(Model, EveryPairOfABatchStopsByItself) {
+  torch::manual_seed(1);
   const torch::NoGradGuard no_grad;
-  const Weights weights = randomWeights(Pairing::kNearest, 2);
-  const auto source = torch::randn({2, 50, 3}), target = torch::randn({2, 40, 3});
-  const auto outputs = [&](Pairing pairing) {
-    Unirit model(pairing);
-    model->setWeights(weights);
-    torch::Tensor feature;
-    return std::make_pair(model->rigid->forward(source, target, feature).apply(source),
-                          model->nonrigid->forward(source, target));
-  };
-  const auto nearest = outputs(Pairing::kNearest), offsets = outputs(Pairing::kOffsets);
-  EXPECT_TRUE(torch::allclose(nearest.first, offsets.first, 1e-5, 1e-5));
-  EXPECT_TRUE(torch::allclose(nearest.second, offsets.second, 1e-5, 1e-5));
-  EXPECT_THROW(Unirit(Pairing::kNearest)->setWeights(randomWeights(Pairing::kOffsets, 2)),
-               std::invalid_argument);
+  Weights weights = randomWeights(Pairing::kOffsets, 2);
+  weights.layers.at("flow.decoder.3").weight *= 1.5F;
+  Unirit model(Pairing::kOffsets);
+  model->setWeights(weights);
+  const auto source = torch::rand({4, 60, 3}) * 2 - 1;
+  const auto target =
+      source + 0.1 * torch::arange(4).view({4, 1, 1});  // the first is there already
+  const auto together = model->moveRigidly(source, target, 6);
+  for (std::int64_t pair = 0; pair < 4; ++pair) {
+    const auto alone =
+        model->moveRigidly(source.slice(0, pair, pair + 1), target.slice(0, pair, pair + 1), 6);
+    EXPECT_TRUE(torch::allclose(together.slice(0, pair, pair + 1), alone, 1e-4, 1e-5)) << pair;
+  }
+}
+
+TEST(Model, TheBestRigidFitFindsAPoseAndNoReflection) {
+  torch::manual_seed(1);
+  const auto points = torch::randn({2, 20, 3});
+  const auto turn = torch::tensor({{0.0F, -1.0F, 0.0F}, {1.0F, 0.0F, 0.0F}, {0.0F, 0.0F, 1.0F}});
+  const Pose pose{turn.expand({2, 3, 3}), torch::randn({2, 3})};
+  const auto moved = pose.apply(points);
+  EXPECT_TRUE(torch::allclose(bestRigidFit(points, moved).apply(points), moved, 1e-4, 1e-5));
+  const Pose mirrored = bestRigidFit(points, points * torch::tensor({1.0F, 1.0F, -1.0F}));
+  EXPECT_TRUE(torch::allclose(torch::linalg_det(mirrored.rotation), torch::ones({2}), 1e-4, 1e-5));
 }
 
 TEST_F(Training, BatchesDependOnSeedAndNumberAlone) {
@@ -149,6 +176,7 @@ TEST_F(Training, LearnsToTranslate) {
   settings_.batch.partial_share = settings_.batch.centred_share = 0.0;
   settings_.alpha = 0.0;
   settings_.iterations = 1;
+  settings_.learning_rate = 1e-3;
   settings_.steps = 150;
   settings_.report_every = 15;
   double first = 0.0;
@@ -158,7 +186,7 @@ TEST_F(Training, LearnsToTranslate) {
     if (first == 0.0) first = progress.loss;
     last_ = progress;
   });
-  EXPECT_LT(last_.loss, 0.6 * first);
+  EXPECT_LT(last_.loss, 0.75 * first);  // the deformation is left
 }
 
 TEST_F(Training, GoesOnFromItsCheckpointAsIfItHadNotStopped) {
@@ -207,19 +235,28 @@ TEST_F(Training, NearPairsAreNotRotated) {
   EXPECT_LT(largestTurn(1.0), 0.4F);
 }
 
-TEST_F(Training, LeavesTheRigidModulesAloneWhereAlphaIsOneAndTheOtherWhereItIsZero) {
+TEST_F(Training, LeavesOneModuleAloneWhereAlphaIsOneAndTheOtherWhereItIsZero) {
+  settings_.pairing = Pairing::kNearest;
   settings_.alpha = 0.0;
-  EXPECT_EQ(trainedModules(), (std::set<std::string>{"fine", "rigid"}));
+  EXPECT_EQ(trainedModules(), (std::set<std::string>{"rigid"}));
   settings_.alpha = 1.0;
   EXPECT_EQ(trainedModules(), (std::set<std::string>{"nonrigid"}));
 }
 
-TEST_F(Training, KeepsTheRigidModuleWhereAskedTo) {
-  settings_.keep_rigid = true;
-  EXPECT_EQ(trainedModules(), (std::set<std::string>{"fine", "nonrigid"}));
+TEST_F(Training, LearnsFromTheDistanceToTheTargetAlone) {
+  settings_.loss = Loss::kPaper;
+  EXPECT_EQ(trainedModules(), (std::set<std::string>{"flow"}));
+}
+
+TEST_F(Training, TrainsTheFlowModuleInEitherStage) {
+  for (const double alpha : {0.0, 1.0}) {
+    settings_.alpha = alpha;
+    EXPECT_EQ(trainedModules(), (std::set<std::string>{"flow"}));
+  }
 }
 
 TEST_F(Training, LearnsFromAsManyPointsAsAskedFor) {
+  settings_.pairing = Pairing::kNearest;
   const Weights of_all = trained(settings_, folder_ / "all");
   settings_.decoded_points = 7;
   const Weights of_some = trained(settings_, folder_ / "some");
@@ -239,8 +276,7 @@ TEST_F(Training, PartsOfABatchTeachWhatTheWholeTeaches) {
 
 TEST_F(Training, DecodesAsManyPointsAsAskedFor) {
   const torch::NoGradGuard no_grad;
-  for (const Pairing pairing :
-       {Pairing::kNearest, Pairing::kOffsets, Pairing::kNone, Pairing::kRow}) {
+  for (const Pairing pairing : {Pairing::kNearest, Pairing::kNone, Pairing::kRow}) {
     Unirit model(pairing);
     const auto source = torch::randn({2, 40, 3}), target = torch::randn({2, 40, 3});
     const auto all = model->nonrigid->forward(source, target);

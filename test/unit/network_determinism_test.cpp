@@ -90,10 +90,27 @@ TEST_P(NetworkDeterminism, aTieOfNearestTargetsDoesNotDependOnTheirOrder) {
 }
 
 TEST_P(NetworkDeterminism, aPointsDisplacementDoesNotDependOnTheOtherQueries) {
-  const Output together = run(source_, target_, queries_);
-  for (const Eigen::Index i : {0, 47, 48, 311, 316}) {
-    EXPECT_EQ(run(source_, target_, queries_.col(i)).displacements, together.displacements.col(i));
+  for (const Pairing pairing : {Pairing::kNearest, Pairing::kOffsets}) {
+    pairing_ = pairing;
+    const Output together = run(source_, target_, queries_);
+    for (const Eigen::Index i : {0, 47, 48, 311, 316}) {
+      EXPECT_EQ(run(source_, target_, queries_.col(i)).displacements,
+                together.displacements.col(i));
+    }
+    const Output of_source = run(source_, target_, source_);
+    EXPECT_EQ(run(source_, target_, source_.col(7)).displacements, of_source.displacements.col(7));
   }
+}
+
+TEST_P(NetworkDeterminism, theOrderOfLargeCloudsChangesNoBit) {
+  pairing_ = Pairing::kOffsets;
+  const Points source = randomPoints(1100, 1), target = randomPoints(700, 2);
+  const auto order = shuffled(source.cols(), 4);
+  const Output straight = run(source, target, source);
+  const Points other = select(source, order);
+  const Output shuffled_output = run(other, select(target, shuffled(target.cols(), 5)), other);
+  EXPECT_EQ(shuffled_output.transform, straight.transform);
+  EXPECT_EQ(shuffled_output.displacements, select(straight.displacements, order));
 }
 
 TEST_P(NetworkDeterminism, buffersOfAnEarlierCallLeaveNoTrace) {

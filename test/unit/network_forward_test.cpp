@@ -79,6 +79,10 @@ TEST_P(NetworkForward, everyRigidIterateAgreesWithTheReference) {
   }
 }
 
+TEST_P(NetworkForward, theRigidStageByFlowReadsSomePointsOfLargeClouds) {
+  expectRigidAgrees(Pairing::kOffsets, randomPoints(1100, 1), randomPoints(700, 2), 2);
+}
+
 TEST_P(NetworkForward, cloudsOfOnePointAreRegistered) {
   for (const Pairing pairing : {Pairing::kNearest, Pairing::kOffsets}) {
     expectRigidAgrees(pairing, randomPoints(1, 1), randomPoints(131, 2), 4);
@@ -94,6 +98,7 @@ TEST_P(NetworkForward, displacementsAgreeWithTheReferenceThatSavesNothing) {
   }
   const Points source = randomPoints(203, 1);
   expectDisplacementsAgree(Pairing::kRow, source, randomPoints(203, 2), source);
+  expectDisplacementsAgree(Pairing::kOffsets, source, randomPoints(131, 2), source);
 }
 
 TEST_P(NetworkForward, noQueriesGiveNoDisplacements) {

@@ -47,6 +47,29 @@ TEST_P(Kernel, denseIsWeightTimesInputPlusBias) {
   }
 }
 
+TEST_P(Kernel, neighbourhoodSumsWeighByEverSmallerGaussians) {
+  const Points points = reference::randomPoints(35, 1), queries = reference::randomPoints(18, 2);
+  const RowMajor values = randomRows(35, kAveraged);
+  const long asked = 17;
+  RowMajor sums = RowMajor::Constant(18, kNeighbourhoods * kAveraged, -1.0F);
+  selectKernels().neighbourhoodSums(queries.data(), asked, points.data(), values.data(), 35, -0.7F,
+                                    sums.data());
+  for (long q = 0; q < asked; ++q) {
+    double exponent = -0.7;
+    for (int size = 0; size < kNeighbourhoods; ++size, exponent *= 4.0) {
+      const auto distances = (points.colwise() - queries.col(q)).colwise().squaredNorm();
+      const Eigen::VectorXd weights =
+          (exponent * distances.transpose().cast<double>().array()).exp();
+      const Eigen::RowVectorXd expected = weights.transpose() * values.cast<double>();
+      EXPECT_LT((sums.row(q).segment(kAveraged * size, kAveraged).cast<double>() - expected)
+                    .cwiseAbs()
+                    .maxCoeff(),
+                5e-5);
+    }
+  }
+  EXPECT_EQ(sums.row(asked).maxCoeff(), -1.0F) << "one not asked for";
+}
+
 TEST_P(Kernel, reluCutsWhatIsNegativeAndNothingElse) {
   const Layer layer = randomLayer(20, 33);
   const RowMajor input = randomRows(13, 20);

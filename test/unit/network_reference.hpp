@@ -2,9 +2,12 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
 #include <memory>
 #include <numeric>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "unirit/network/network.hpp"
@@ -42,11 +45,9 @@ inline Eigen::Matrix3Xd offsets(const Eigen::Matrix3Xd& points, const Eigen::Mat
   return offsets;
 }
 
+/// Of a column of numbers for each point.
 inline Eigen::VectorXd encode(const Weights& weights, const std::string& name,
-                              const Eigen::Matrix3Xd& points, const Eigen::Matrix3Xd& others) {
-  Eigen::MatrixXd values(weights.layers.at(name + ".0").weight.cols(), points.cols());
-  values.topRows(3) = points;
-  if (values.rows() == kOffsetInputs) values.bottomRows(3) = offsets(points, others);
+                              Eigen::MatrixXd values) {
   for (int i = 0; i < 5; ++i) {
     values = dense(weights, name + "." + std::to_string(i), values, true);
   }
@@ -54,45 +55,135 @@ inline Eigen::VectorXd encode(const Weights& weights, const std::string& name,
 }
 
 inline Eigen::VectorXd features(const Weights& weights, const std::string& module,
-                                const Eigen::Matrix3Xd& source, const Eigen::Matrix3Xd& target) {
-  const auto of_source = encode(weights, module + ".source_encoder", source, target),
-             of_target = encode(weights, module + ".target_encoder", target, source);
+                                const Eigen::MatrixXd& source, const Eigen::MatrixXd& target) {
+  const auto of_source = encode(weights, module + ".source_encoder", source),
+             of_target = encode(weights, module + ".target_encoder", target);
   Eigen::VectorXd both(of_source.size() + of_target.size());
   both << of_source, of_target;
   return both;
 }
 
+/// What the flow module reads of each of `queries`, among the source's points.
+inline Eigen::MatrixXd surroundings(const Eigen::Matrix3Xd& source, const Eigen::Matrix3Xd& target,
+                                    const Eigen::Matrix3Xd& queries) {
+  const Eigen::Matrix3Xd to_target = offsets(source, target), to_source = offsets(target, source);
+  const double ratio = static_cast<double>(source.cols()) / static_cast<double>(target.cols());
+  Eigen::MatrixXd inputs(kFlowInputs, queries.cols());
+  for (Eigen::Index q = 0; q < queries.cols(); ++q) {
+    const Eigen::Vector3d query = queries.col(q);
+    std::vector<Eigen::Vector3d> vectors{offsets(query, target)};
+    std::vector<double> shares;
+    for (const double scale : kFlowScales) {
+      const auto weightAt = [&](const Eigen::Vector3d& point) {
+        return std::exp(-0.5 * (point - query).squaredNorm() / (scale * scale));
+      };
+      Eigen::Vector3d forth = Eigen::Vector3d::Zero(), back = Eigen::Vector3d::Zero();
+      double of_source = 0.0, of_target = 0.0;
+      for (Eigen::Index i = 0; i < source.cols(); ++i) {
+        forth += weightAt(source.col(i)) * to_target.col(i);
+        of_source += weightAt(source.col(i));
+      }
+      for (Eigen::Index j = 0; j < target.cols(); ++j) {
+        const double weight = weightAt(target.col(j) + to_source.col(j));
+        back -= weight * to_source.col(j);
+        of_target += weight;
+      }
+      vectors.push_back(forth / of_source);
+      vectors.push_back(back / (of_target + kFlowFewest));
+      shares.push_back(ratio * of_target / of_source);
+    }
+    Eigen::Index row = 0;
+    for (const double value : query) inputs(row++, q) = value;
+    for (const double share : shares) inputs(row++, q) = share;
+    for (const auto& vector : vectors) {
+      for (const double value : vector) inputs(row++, q) = value;
+    }
+    for (const auto& vector : vectors) inputs(row++, q) = vector.norm();
+  }
+  return inputs;
+}
+
+inline Eigen::Matrix3Xd flow(const Weights& weights, const Eigen::Matrix3Xd& source,
+                             const Eigen::Matrix3Xd& target, const Eigen::Matrix3Xd& queries) {
+  Eigen::MatrixXd of_target(kFlowTargetInputs, target.cols());
+  of_target << target, offsets(target, source);
+  const Eigen::VectorXd both =
+      features(weights, "flow", surroundings(source, target, source), of_target);
+  const Eigen::MatrixXd read = surroundings(source, target, queries);
+  Eigen::MatrixXd inputs(kFlowInputs + both.size(), queries.cols());
+  inputs << read, both.replicate(1, queries.cols());
+  const Eigen::MatrixXd outputs = decode(weights, "flow.decoder", inputs);
+  Eigen::Matrix3Xd moved = outputs.topRows(3);
+  for (int k = 0; k < kFlowVectors; ++k) {
+    const auto vectors = read.middleRows(3 + kFlowScales.size() + 3 * k, 3);
+    moved += vectors * outputs.row(3 + k).asDiagonal();
+  }
+  return moved;
+}
+
+/// What the rigid stage of the flow module reads of a cloud.
+inline Points thinned(const Points& points) {
+  std::vector<Eigen::Vector3f> sorted(static_cast<std::size_t>(points.cols()));
+  for (std::size_t i = 0; i < sorted.size(); ++i) {
+    sorted[i] = points.col(static_cast<Eigen::Index>(i));
+  }
+  std::sort(sorted.begin(), sorted.end(), [](const auto& a, const auto& b) {
+    return std::tie(a[0], a[1], a[2]) < std::tie(b[0], b[1], b[2]);
+  });
+  const std::size_t stride = (sorted.size() + kFlowRigidPoints - 1) / kFlowRigidPoints;
+  Points kept(3, static_cast<Eigen::Index>((sorted.size() + stride - 1) / stride));
+  for (Eigen::Index i = 0; i < kept.cols(); ++i) {
+    kept.col(i) = sorted[static_cast<std::size_t>(i) * stride];
+  }
+  return kept;
+}
+
 /// The accumulated transform after each iteration.
-inline std::vector<Eigen::Isometry3d> estimateRigid(const Weights& weights, const Points& source,
-                                                    const Points& target, int iterations) {
+inline std::vector<Eigen::Isometry3d> estimateRigid(const Weights& weights,
+                                                    const Points& source_points,
+                                                    const Points& target_points, int iterations) {
+  const bool by_flow = weights.pairing == Pairing::kOffsets;
+  const Points source = by_flow ? thinned(source_points) : source_points;
+  const Eigen::Matrix3Xd target = (by_flow ? thinned(target_points) : target_points).cast<double>();
   std::vector<Eigen::Isometry3d> iterates;
   Eigen::Isometry3d transform = Eigen::Isometry3d::Identity();
   for (int i = 0; i < iterations; ++i) {
-    const bool coarse = i < coarseIterations(weights.pairing, iterations);
-    const std::string module = coarse ? "rigid" : "fine";
     const Eigen::Matrix3Xd moved = transform * source.cast<double>();
-    const Eigen::VectorXd pose = decode(weights, module + ".decoder",
-                                        features(weights, module, moved, target.cast<double>()));
-    const Eigen::Quaterniond rotation(pose[0], pose[1], pose[2], pose[3]);
-    const Eigen::Isometry3d step = Eigen::Translation3d(pose.tail<3>()) * rotation.normalized();
+    Eigen::Isometry3d step;
+    if (by_flow) {
+      step = Eigen::umeyama(moved, moved + flow(weights, moved, target, moved), false);
+    } else {
+      const Eigen::VectorXd pose =
+          decode(weights, "rigid.decoder", features(weights, "rigid", moved, target));
+      const Eigen::Quaterniond rotation(pose[0], pose[1], pose[2], pose[3]);
+      step = Eigen::Translation3d(pose.tail<3>()) * rotation.normalized();
+    }
     transform = step * transform;
     iterates.push_back(transform);
+    const double motion = (step * moved - moved).norm() / std::sqrt(moved.cols());
+    if (by_flow && motion < static_cast<double>(kFlowConverged)) break;
   }
   return iterates;
 }
 
-inline Eigen::Matrix3Xd estimateDisplacements(const Weights& weights, const Points& source,
-                                              const Points& target, const Points& queries) {
-  const Eigen::VectorXd both =
-      features(weights, "nonrigid", source.cast<double>(), target.cast<double>());
-  Eigen::MatrixXd inputs(nonRigidDecoderInputs(weights.pairing), queries.cols());
-  inputs.topRows(3) = queries.cast<double>();
-  inputs.middleRows(3, both.size()).colwise() = both;
-  if (weights.pairing == Pairing::kRow) {
-    inputs.bottomRows(3) = target.cast<double>();
-  } else if (weights.pairing != Pairing::kNone) {
-    inputs.bottomRows(3) = offsets(queries.cast<double>(), target.cast<double>());
+inline Eigen::Matrix3Xd estimateDisplacements(const Weights& weights, const Points& source_points,
+                                              const Points& target_points,
+                                              const Points& query_points) {
+  Eigen::Matrix3Xd source = source_points.cast<double>(), queries = query_points.cast<double>();
+  const Eigen::Matrix3Xd target = target_points.cast<double>();
+  if (weights.pairing == Pairing::kOffsets) {
+    for (int step = 0; step < kFlowSteps; ++step) {
+      queries += flow(weights, source, target, queries);
+      source += flow(weights, source, target, source);
+    }
+    return queries - query_points.cast<double>();
   }
+  const Eigen::VectorXd both = features(weights, "nonrigid", source, target);
+  Eigen::MatrixXd inputs(nonRigidDecoderInputs(weights.pairing), queries.cols());
+  inputs.topRows(3) = queries;
+  inputs.middleRows(3, both.size()).colwise() = both;
+  if (weights.pairing == Pairing::kRow) inputs.bottomRows(3) = target;
+  if (weights.pairing == Pairing::kNearest) inputs.bottomRows(3) = offsets(queries, target);
   return decode(weights, "nonrigid.decoder", inputs);
 }
 
@@ -105,7 +196,11 @@ inline std::shared_ptr<const Weights> makeLoudWeights(Pairing pairing) {
       layer.bias[k] += static_cast<float>(0.1 * random.normal());
     }
   }
-  weights->layers.at("nonrigid.decoder.5").weight *= 20.0F;
+  if (pairing == Pairing::kOffsets) {
+    weights->layers.at("flow.decoder.3").weight *= 1.5F;
+  } else {
+    weights->layers.at("nonrigid.decoder.5").weight *= 20.0F;
+  }
   return weights;
 }
 

@@ -17,23 +17,30 @@ inline constexpr std::array<int, 6> kRigidDecoderWidths{1024, 1024, 512, 512, 25
 inline constexpr std::array<int, 6> kNonRigidDecoderWidths{1024, 512, 256, 128, 64, 3};
 inline constexpr int kFeatureSize = 1024;
 
-/// With pairing offsets a smaller rigid module goes on where the published one has brought the
-/// organ near: its encoders, and the non-rigid module's, read beside a point (3) the way to the
-/// nearest point of the other cloud (3), which tells what is left of the error there.
-inline constexpr std::array<int, 5> kFineEncoderWidths{64, 64, 64, 128, 512};
-inline constexpr std::array<int, 3> kFineDecoderWidths{256, 256, 7};
-inline constexpr int kOffsetInputs = 6;
-
-/// Iterations of the published rigid module before the fine one's.
-constexpr int coarseIterations(Pairing pairing, int iterations) {
-  constexpr int kCoarse = 2;
-  return pairing == Pairing::kOffsets && iterations > kCoarse ? kCoarse : iterations;
-}
-
-/// Inputs of the non-rigid module's encoders.
-constexpr int nonRigidEncoderInputs(Pairing pairing) {
-  return pairing == Pairing::kOffsets ? kOffsetInputs : 3;
-}
+/// With pairing offsets one smaller module does both stages: it tells the way each point of the
+/// source has to go, its scene flow, of which a rigid iteration takes the best rigid fit. Beside a
+/// point it reads where the clouds lie to each other about it: vectors to the nearest point of the
+/// other cloud and their means over neighbourhoods of several sizes, either way.
+inline constexpr std::array<int, 5> kFlowEncoderWidths{32, 64, 64, 128, 256};
+inline constexpr int kFlowFeatureSize = kFlowEncoderWidths.back();
+inline constexpr std::array<float, 4> kFlowScales{0.8F, 0.4F, 0.2F, 0.1F};  ///< half extents
+/// Weight of the target's points below which their mean vector fades to zero.
+inline constexpr float kFlowFewest = 0.01F;
+inline constexpr int kFlowVectors = 1 + 2 * static_cast<int>(kFlowScales.size());
+/// Point (3), for each scale the share of the target found there, the vectors, their lengths.
+inline constexpr int kFlowInputs = 3 + static_cast<int>(kFlowScales.size()) + 4 * kFlowVectors;
+/// What is read beside a point of the target: itself (3) and the vector to the source's nearest.
+inline constexpr int kFlowTargetInputs = 6;
+/// A displacement, and how much of each vector is added to it.
+inline constexpr std::array<int, 4> kFlowDecoderWidths{128, 128, 64, 3 + kFlowVectors};
+/// Points of each cloud, at most, that the rigid stage reads: evenly chosen ones of more, every so
+/// many in the order of their coordinates.
+inline constexpr int kFlowRigidPoints = 512;
+/// Iterations of the rigid stage end after one that moves these points by less than this, RMS [half
+/// extents]: those that followed would drift.
+inline constexpr float kFlowConverged = 0.02F;
+/// Times that the non-rigid stage moves the source along its flow.
+inline constexpr int kFlowSteps = 2;
 
 /// Inputs of the non-rigid decoder: point (3), two global features (2048), paired row (3 or none).
 constexpr int nonRigidDecoderInputs(Pairing pairing) {
@@ -49,9 +56,9 @@ struct LayerShape {
 };
 
 /// All layers in the file's order: rigid.source_encoder.0 to .4, rigid.target_encoder.0 ...,
-/// rigid.decoder.0 to .5, with pairing offsets the same of fine, with a decoder of .0 to .2, and
-/// nonrigid.source_encoder, nonrigid.target_encoder, nonrigid.decoder.
-/// The columns of nonrigid.decoder.0 are: point, source feature, target feature, paired row.
+/// rigid.decoder.0 to .5, and the same of nonrigid; with pairing offsets those of flow alone.
+/// The columns of nonrigid.decoder.0 are: point, source feature, target feature, paired row; those
+/// of flow.decoder.0: what is read of a point, source feature, target feature.
 std::vector<LayerShape> layerShapes(Pairing pairing);
 
 }  // namespace unirit

@@ -32,22 +32,24 @@ class Network {
   Network(Network&&) noexcept;
   Network& operator=(Network&&) noexcept;
 
-  /// Rigid module: the transform that takes `source` to `target` (3 x N and 3 x M, N and M free).
+  /// Rigid stage: the transform that takes `source` to `target` (3 x N and 3 x M, N and M free).
   /// Throws std::invalid_argument where a cloud is empty or not finite, std::runtime_error where
-  /// the module's output is no rotation.
+  /// what the network puts out is no rotation or not finite.
   /// `iterates`, if given, gets the accumulated transform after each iteration (for tests).
   Eigen::Isometry3f estimateRigid(const Points& source, const Points& target,
                                   std::vector<Eigen::Isometry3f>* iterates = nullptr);
 
-  /// Non-rigid module: displacement of each of `queries` (3 x Q) given the rigidly moved `source`
-  /// and `target`. With pairing row, queries must be the source and of the target's size.
+  /// Non-rigid stage: displacement of each of `queries` (3 x Q) given the rigidly moved `source`
+  /// and `target`. With pairing row, queries must be the source and of the target's size. Throws
+  /// as estimateRigid does.
   Points estimateDisplacements(const Points& source, const Points& target, const Points& queries);
 
   /// The same into `displacements`, which is resized: no memory is allocated where its size fits.
   void estimateDisplacements(const Points& source, const Points& target, const Points& queries,
                              Points& displacements);
 
-  /// Global features of the last call, 2 x 1024 (source, target), for the golden-state test.
+  /// Global features of the last call of either stage, of the source, then of the target (for
+  /// tests).
   const Eigen::VectorXf& rigidFeatures() const;
   const Eigen::VectorXf& nonRigidFeatures() const;
 
@@ -58,9 +60,9 @@ class Network {
   std::unique_ptr<Implementation> implementation_;
 };
 
-/// Multiply-adds of one forward pass with n rigid iterations, as published and with the two exact
-/// savings (the published rigid module's target feature once; the decoder's global columns
-/// once per pair). Searches for nearest points are not counted.
+/// Multiply-adds of the layers in one forward pass with n rigid iterations, as published and with
+/// the exact savings (the published rigid module's target feature once, in both counts; the
+/// decoder's global columns once per pair). What finds neighbours is not counted.
 double multiplyAdds(Eigen::Index source_points, Eigen::Index target_points, int rigid_iterations,
                     Pairing pairing, bool with_savings);
 

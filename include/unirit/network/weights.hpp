@@ -38,8 +38,9 @@ Weights readWeights(const std::string& path);
 /// does and where a value does not fit in half precision.
 void writeWeights(const Weights& weights, const std::string& path);
 
-/// He-initialised weights (Kaiming normal, zero biases), last layers scaled by 0.05, the rigid
-/// decoder's last bias a unit quaternion: starts at the identity. For tests and training.
+/// He-initialised weights (Kaiming normal, zero biases), last layers scaled by 0.05, that of the
+/// flow by 0.01, the rigid decoder's last bias a unit quaternion: starts near the identity. For
+/// tests and training.
 Weights randomWeights(Pairing pairing, unsigned seed);
 
 }  // namespace unirit
