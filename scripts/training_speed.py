@@ -192,6 +192,7 @@ def train_with_torch(options):
             self.source = Encoder([FLOW_INPUTS] + FLOW_ENCODER)
             self.target = Encoder([FLOW_TARGET_INPUTS] + FLOW_ENCODER)
             self.decoder = layers(FLOW_DECODER)
+            self.decoder[-1].weight.data *= 0.01
 
         def forward(self, moved, target):
             with torch.no_grad():
