@@ -96,7 +96,6 @@ class FlowModule : public Modules {
     const bool of_source = queries.cols() == source.cols() && queries == source;
     nonrigid_.setOrder(source, target, source.cols(), target.cols());
     selectInto(source, nonrigid_.order, nonrigid_.source);
-    start_ = nonrigid_.source;
     reached_ = queries;
     for (int step = 0; step < kFlowSteps; ++step) {
       const RowsView rows = encode(nonrigid_);
@@ -114,7 +113,8 @@ class FlowModule : public Modules {
     }
     for (std::size_t i = 0; i < nonrigid_.order.size(); ++i) {
       const auto sorted = static_cast<Eigen::Index>(i);
-      displacements.col(nonrigid_.order[i]) = nonrigid_.source.col(sorted) - start_.col(sorted);
+      const int given = nonrigid_.order[i];
+      displacements.col(given) = nonrigid_.source.col(sorted) - source.col(given);
     }
   }
 
@@ -171,7 +171,7 @@ class FlowModule : public Modules {
                         "flow.decoder", static_cast<int>(kFlowDecoderWidths.size()),
                         kFlowInputs,    2 * kFlowFeatureSize};
   FlowStage rigid_{workspace_}, nonrigid_{workspace_};
-  Points start_, reached_, query_flow_;
+  Points reached_, query_flow_;
   std::vector<float> query_rows_;
 };
 
