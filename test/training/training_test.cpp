@@ -174,6 +174,7 @@ TEST_F(Training, LearnsToTranslate) {
   settings_.batch.pairs = 8;
   settings_.batch.rotation = settings_.batch.common_rotation = 0.0;
   settings_.batch.partial_share = settings_.batch.centred_share = 0.0;
+  settings_.batch.translation = 0.75;  // far more than the deformation, which is left
   settings_.alpha = 0.0;
   settings_.iterations = 1;
   settings_.learning_rate = 1e-3;
@@ -186,7 +187,7 @@ TEST_F(Training, LearnsToTranslate) {
     if (first == 0.0) first = progress.loss;
     last_ = progress;
   });
-  EXPECT_LT(last_.loss, 0.75 * first);  // the deformation is left
+  EXPECT_LT(last_.loss, 0.6 * first);
 }
 
 TEST_F(Training, GoesOnFromItsCheckpointAsIfItHadNotStopped) {
