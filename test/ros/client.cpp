@@ -72,7 +72,7 @@ RegisterResponse Client::callRegister(const RegisterRequest& request) {
   auto service = std::make_shared<Register>();
   service->request = request;
   const std::string name = nh_.resolveName("register");
-  if (!finishes([service, name] { EXPECT_TRUE(ros::service::call(name, *service)) << name; })) {
+  if (!finishes([service, name] { EXPECT_TRUE(callService(name, *service)) << name; })) {
     return {};
   }
   return service->response;
@@ -89,7 +89,7 @@ DeformPointsResponse Client::callDeformPoints(const std::string& frame, const Po
     service->request.points.push_back(point);
   }
   const std::string name = nh_.resolveName("deform_points");
-  if (!finishes([service, name] { EXPECT_TRUE(ros::service::call(name, *service)) << name; })) {
+  if (!finishes([service, name] { EXPECT_TRUE(callService(name, *service)) << name; })) {
     return {};
   }
   return service->response;
@@ -102,7 +102,7 @@ RegisterResponse Client::registerUntil(
   do {
     response = callRegister();
     if (wanted(response.result)) return response;
-    ros::WallDuration(0.01).sleep();  // roscpp loses one call in thousands that come at once
+    ros::WallDuration(0.01).sleep();
   } while (ros::WallTime::now() < end);
   ADD_FAILURE() << "no registration as wanted; the last said: " << response.result.message;
   return response;

@@ -64,7 +64,7 @@ TEST(Edge, isLeftToAnotherNodeletOfTheSameManager) {
 
   nodelet::NodeletUnload unload;
   unload.request.name = "/left";
-  ASSERT_TRUE(ros::service::call("/shared_manager/unload_nodelet", unload));
+  ASSERT_TRUE(callService("/shared_manager/unload_nodelet", unload));
   expectRegisters(right);
 }
 

@@ -98,7 +98,7 @@ TEST(Faults, withoutCloudsTheMissingOneIsNamed) {
 template <class Service>
 bool call(const std::string& name, Service& service) {
   bool answered = false;
-  return finishes([&] { answered = ros::service::call(name, service); }) && answered;
+  return finishes([&] { answered = callService(name, service); }) && answered;
 }
 
 void expectRegisters(Client& client) {
@@ -128,7 +128,7 @@ TEST(Managers, unloadDuringARegistrationEndsItAndNothingElse) {
   std::thread registering([&] {
     Register service;
     service.request = request;
-    while (ros::service::call("/first/register", service)) ++answered;
+    while (callService("/first/register", service)) ++answered;
   });
   while (answered == 0) std::this_thread::yield();  // from here on one is always under way
   nodelet::NodeletUnload unload;

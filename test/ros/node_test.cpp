@@ -17,7 +17,7 @@ void setThreshold(const std::string& name, double value) {
   change.request.config.doubles[0].name = name;
   change.request.config.doubles[0].value = value;
   const std::string node = ros::param::param<std::string>("~node", "/unirit");
-  ASSERT_TRUE(ros::service::call(node + "/plausibility/set_parameters", change));
+  ASSERT_TRUE(callService(node + "/plausibility/set_parameters", change));
 }
 
 /// Restores a threshold when the test ends.

@@ -25,7 +25,7 @@ TEST(Replay, everyCloudIsRegisteredInOrder) {
 
   std_srvs::SetBool resume;
   ASSERT_TRUE(ros::service::waitForService("/player/pause_playback", ros::Duration(kDeadline)));
-  ASSERT_TRUE(ros::service::call("/player/pause_playback", resume));
+  ASSERT_TRUE(callService("/player/pause_playback", resume));
   ASSERT_TRUE(client.waitUntil([&] { return client.results.size() == kSessionViews; }))
       << client.results.size() << " results";
 
