@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: BSD-3-Clause
 # Usage: train_model.sh ORGANS OUTPUT [cpu|cuda]
 # Trains weights as those of models/unirit.safetensors were: on ORGANS/ORGAN/*.ply (millimetres) and
-# on digital phantoms, and leaves checkpoint, curves and unirit.safetensors in OUTPUT. Run again, it goes on
-# where it was stopped. On two cores it takes an hour; cuda needs a LibTorch that has it (see
-# src/training/CMakeLists.txt).
+# on digital phantoms, and leaves checkpoint, curves and unirit.safetensors in OUTPUT. Run again, it
+# goes on where it was stopped. On two cores it takes an hour; cuda needs a LibTorch that has it
+# (see src/training/CMakeLists.txt).
 set -euo pipefail
 if (($# < 2 || $# > 3)) || [[ ! -d $1 ]]; then
   echo "usage: train_model.sh ORGANS OUTPUT [cpu|cuda]; ORGANS is a folder of ORGAN/*.ply" >&2
@@ -15,6 +15,6 @@ organs=$(realpath "$1") output=$(realpath -m "$2") device=${3:-cpu}
 source "$(dirname "${BASH_SOURCE[0]}")/setup.sh"
 
 exec "$root/build/devel/lib/unirit/unirit_train" --data "$organs" --phantoms 6 --hold-out 24 \
-  --output "$output" --device "$device" --steps 5200 --batch 32 --points 512 --iterations 5 \
-  --partial-share 0.55 --near-share 0.3 --pairs-per-deformation 8 --learning-rate 5e-4 --seed 2 \
-  --report-every 250 --save-every 100
+  --output "$output" --device "$device" --steps 1700 --batch 32 --points 512 --iterations 5 \
+  --partial-share 0.55 --near-share 0.35 --pairs-per-deformation 8 --learning-rate 5e-4 --seed 2 \
+  --report-every 100 --save-every 50

@@ -26,11 +26,12 @@ ENCODER = [3, 64, 64, 64, 128, 1024]
 RIGID_DECODER = [2048, 1024, 1024, 512, 512, 256, 7]
 NONRIGID_DECODER = [2054, 1024, 512, 256, 128, 64, 3]
 DECODED_POINTS = 64
-FLOW_ENCODER = [32, 64, 64, 128, 256]
+FLOW_ENCODER = [64, 64, 64, 128, 256]
 FLOW_SCALES = [0.8, 0.4, 0.2, 0.1]
-FLOW_INPUTS, FLOW_TARGET_INPUTS = 43, 6
-FLOW_DECODER = [FLOW_INPUTS + 512, 128, 128, 64, 12]
-PARAMETERS = {"nearest": 7466122, "offsets": 193580}
+FLOW_INPUTS, FLOW_TARGET_INPUTS = 79, 6
+FLOW_DECODER = [FLOW_INPUTS + 512, 128, 128, 128, 21]
+FLOW_STEPS = 3
+PARAMETERS = {"nearest": 7466122, "offsets": 216405}
 PHASES = {"rigid": ("nearest", 0.0), "both": ("nearest", 0.5),
           "flow": ("offsets", 0.5)}  # pairing and weight of the global loss
 
@@ -164,23 +165,39 @@ def train_with_torch(options):
             values = values + nn.functional.linear(features, columns, first.bias).unsqueeze(1)
             return run_layers(self.decoder[1:], torch.relu(values))
 
-    def surroundings(source, target):
+    def normals_of(points):
+        kernel = (torch.cdist(points, points).square() * (-0.5 / FLOW_SCALES[-1] ** 2)).exp()
+        weights = kernel / kernel.sum(2, True)
+        mean = weights @ points
+        squares = weights @ (points.unsqueeze(3) * points.unsqueeze(2)).flatten(2)
+        covariance = squares.unflatten(2, (3, 3)) - mean.unsqueeze(3) * mean.unsqueeze(2)
+        return torch.linalg.eigh(covariance)[1][:, :, :, 0]
+
+    def surroundings(source, deformation, target):
         distances = torch.cdist(source, target)
-        to_target = target.gather(1, of_points(distances.argmin(2))) - source
+        of_source = of_points(distances.argmin(2))
+        to_target = target.gather(1, of_source) - source
+        normals = normals_of(target).gather(1, of_source)
+        to_plane = normals * (normals * to_target).sum(2, True)
+        planes = (normals.unsqueeze(3) * normals.unsqueeze(2)).flatten(2)
         nearest = distances.argmin(1)
         to_source = source.gather(1, of_points(nearest)) - target
         count = torch.zeros_like(source[:, :, :1]).scatter_add_(
             1, nearest.unsqueeze(2), torch.ones_like(target[:, :, :1]))
         total = torch.zeros_like(source).scatter_add_(1, of_points(nearest), -to_source)
-        values = torch.cat([to_target, total, count, torch.ones_like(count)], 2)
+        values = torch.cat([to_target, total, count, torch.ones_like(count), deformation, to_plane,
+                            planes], 2)
         squares = torch.cdist(source, source).square()
         kernel = (squares * (-0.5 / FLOW_SCALES[0] ** 2)).exp()
-        vectors, inputs = [to_target], [source]
+        vectors, inputs = [to_target, deformation], [source]
         for scale in FLOW_SCALES:
             if scale < FLOW_SCALES[0]:
                 kernel = kernel.square().square()
-            forth, back, seen, weight = torch.bmm(kernel, values).split([3, 3, 1, 1], 2)
-            vectors += [forth / weight, back / (seen + 0.01)]
+            forth, back, seen, weight, deformed, plane_sum, plane_squares = torch.bmm(
+                kernel, values).split([3, 3, 1, 1, 3, 3, 9], 2)
+            matrix = (plane_squares / weight).unflatten(2, (3, 3)) + 0.05 * torch.eye(3)
+            vectors += [forth / weight, back / (seen + 0.01), deformed / weight,
+                        torch.linalg.solve(matrix, (plane_sum / weight).unsqueeze(3)).squeeze(3)]
             inputs.append(seen / weight * source.shape[1] / target.shape[1])
         vectors = torch.stack(vectors, 2)
         return (torch.cat(inputs + [vectors.flatten(2), vectors.norm(dim=3)], 2), vectors,
@@ -192,11 +209,12 @@ def train_with_torch(options):
             self.source = Encoder([FLOW_INPUTS] + FLOW_ENCODER)
             self.target = Encoder([FLOW_TARGET_INPUTS] + FLOW_ENCODER)
             self.decoder = layers(FLOW_DECODER)
-            self.decoder[-1].weight.data *= 0.01
+            self.decoder[-1].weight.data *= 0.005
 
-        def forward(self, moved, target):
+        def forward(self, start, moved, target):
             with torch.no_grad():
-                of_source, vectors, of_target = surroundings(moved, target)
+                of_source, vectors, of_target = surroundings(
+                    moved, moved - best_rigid_fit(start, moved), target)
             features = torch.cat([self.source(of_source), self.target(of_target)], 1)
             first = self.decoder[0]
             point, columns = first.weight.split([FLOW_INPUTS, 512], 1)
@@ -247,12 +265,14 @@ def train_with_torch(options):
             update(root_mean_square(some - truth[:, :DECODED_POINTS]))
 
     def step_flow():
-        moved = source
-        for i in range(options.iterations + 2):
-            reached = moved + network["flow"](moved, target)
-            update(root_mean_square(reached - truth))
-            reached = reached.detach()
-            moved = best_rigid_fit(moved, reached) if i < options.iterations else reached
+        start = source
+        for _ in range(options.iterations + 1):  # the last is the non-rigid stage
+            moved = start
+            for _ in range(FLOW_STEPS):
+                reached = moved + network["flow"](start, moved, target)
+                update(root_mean_square(reached - truth))
+                moved = reached.detach()
+            start = best_rigid_fit(start, moved)
 
     step = step_published if pairing == "nearest" else step_flow
     for _ in range(options.steps // 3 + 1):

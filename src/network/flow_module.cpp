@@ -13,18 +13,17 @@
 namespace unirit {
 namespace {
 
-/// The order of the points' coordinates, so that none given to them counts; of more than `most`,
-/// evenly chosen ones.
-void orderPoints(const Points& points, Eigen::Index most, std::vector<int>& order) {
+/// The order of the points' coordinates, so that none given to them counts, of every `stride`-th.
+void orderPoints(const Points& points, std::int64_t stride, std::vector<int>& order) {
   order.resize(static_cast<std::size_t>(points.cols()));
   std::iota(order.begin(), order.end(), 0);
   std::sort(order.begin(), order.end(), [&](int a, int b) {
     const float *p = points.col(a).data(), *q = points.col(b).data();
     return std::lexicographical_compare(p, p + 3, q, q + 3);
   });
-  const auto stride = static_cast<std::size_t>((points.cols() + most - 1) / most);
-  const std::size_t kept = (order.size() + stride - 1) / stride;
-  for (std::size_t i = 0; i < kept; ++i) order[i] = order[i * stride];
+  const auto step = static_cast<std::size_t>(stride);
+  const std::size_t kept = (order.size() + step - 1) / step;
+  for (std::size_t i = 0; i < kept; ++i) order[i] = order[i * step];
   order.resize(kept);
 }
 
@@ -37,16 +36,16 @@ void selectInto(const Points& points, const std::vector<int>& order, Points& sel
 }
 
 /// The rigid transform that takes points nearest to their displaced ones (Umeyama 1991).
-RigidStep bestRigidFit(const Points& points, const Points& displacements) {
+RigidStep bestRigidFit(const Points& points, const Points& reached) {
   const auto count = static_cast<double>(points.cols());
   Eigen::Vector3d from = Eigen::Vector3d::Zero(), to = Eigen::Vector3d::Zero();
   for (Eigen::Index i = 0; i < points.cols(); ++i) {
     from += points.col(i).cast<double>() / count;
-    to += (points.col(i) + displacements.col(i)).cast<double>() / count;
+    to += reached.col(i).cast<double>() / count;
   }
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
   for (Eigen::Index i = 0; i < points.cols(); ++i) {
-    const Eigen::Vector3d moved = (points.col(i) + displacements.col(i)).cast<double>() - to;
+    const Eigen::Vector3d moved = reached.col(i).cast<double>() - to;
     covariance += moved * (points.col(i).cast<double>() - from).transpose();
   }
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(covariance,
@@ -58,20 +57,39 @@ RigidStep bestRigidFit(const Points& points, const Points& displacements) {
           (to - rotation * from).cast<float>()};
 }
 
+/// What the best rigid fit leaves of the way from `start` to `reached`.
+void deformationInto(const RigidStep& fit, const Points& start, const Points& reached,
+                     Points& deformation) {
+  const Eigen::Matrix3f rotation = fit.rotation.toRotationMatrix();
+  deformation.resize(3, start.cols());
+  for (Eigen::Index i = 0; i < start.cols(); ++i) {
+    deformation.col(i) = reached.col(i) - rotation * start.col(i) - fit.translation;
+  }
+}
+
 /// Buffers of a stage, whose clouds may be of other sizes than the other stage's.
 struct FlowStage {
   explicit FlowStage(Workspace& workspace) : surroundings(workspace) {}
 
-  /// The points in the order of their coordinates, at most so many of each cloud.
-  void setOrder(const Points& from, const Points& to, Eigen::Index most_from,
-                Eigen::Index most_to) {
-    orderPoints(from, most_from, order);
-    orderPoints(to, most_to, target_order);
+  /// Reads every so many points of each cloud, in the order of their coordinates.
+  void setClouds(const Points& source, const Points& to, std::int64_t stride,
+                 std::int64_t target_stride) {
+    orderPoints(source, stride, order);
+    orderPoints(to, target_stride, target_order);
     selectInto(to, target_order, target);
+    surroundings.setTarget(target);
+    begin(source);
+  }
+
+  /// The source, in the order that is set, stands here and is not deformed.
+  void begin(const Points& source) {
+    selectInto(source, order, start);
+    reached = start;
   }
 
   std::vector<int> order, target_order;
-  Points source, target, flow;
+  Points start, reached, deformation, target, flow;  // of the source but for target
+  RigidStep fit;                                     // from start to reached
   Surroundings surroundings;
   std::vector<float> rows;  // read of the source
   Eigen::VectorXf features = Eigen::VectorXf::Zero(2 * kFlowFeatureSize);
@@ -83,10 +101,17 @@ class FlowModule : public Modules {
       : workspace_(workspace), weights_(weights) {}
 
   RigidStep rigidStep(const Points& moved, const Points& target, bool first) override {
-    if (first) rigid_.setOrder(moved, target, kFlowRigidPoints, kFlowRigidPoints);
-    selectInto(moved, rigid_.order, rigid_.source);
-    decode(rigid_, encode(rigid_), rigid_.flow);
-    RigidStep step = bestRigidFit(rigid_.source, rigid_.flow);
+    if (first) {
+      rigid_.setClouds(moved, target, flowRigidStride(moved.cols()),
+                       flowRigidStride(target.cols()));
+    } else {
+      rigid_.begin(moved);
+    }
+    for (int i = 0; i < kFlowSteps; ++i) {
+      decode(rigid_, encode(rigid_), rigid_.flow);
+      rigid_.reached += rigid_.flow;
+    }
+    RigidStep step = bestRigidFit(rigid_.start, rigid_.reached);
     step.last = motion(step) < kFlowConverged;
     return step;
   }
@@ -94,18 +119,19 @@ class FlowModule : public Modules {
   void displace(const Points& source, const Points& target, const Points& queries,
                 Points& displacements) override {
     const bool of_source = queries.cols() == source.cols() && queries == source;
-    nonrigid_.setOrder(source, target, source.cols(), target.cols());
-    selectInto(source, nonrigid_.order, nonrigid_.source);
+    nonrigid_.setClouds(source, target, 1, 1);
     reached_ = queries;
     for (int step = 0; step < kFlowSteps; ++step) {
       const RowsView rows = encode(nonrigid_);
       if (!of_source) {
-        decode(nonrigid_, nonrigid_.surroundings.of(reached_, query_rows_), query_flow_);
+        deformationInto(nonrigid_.fit, queries, reached_, query_deformation_);
+        decode(nonrigid_, nonrigid_.surroundings.of(reached_, query_deformation_, query_rows_),
+               query_flow_);
         reached_ += query_flow_;
       }
       if (!of_source && step + 1 == kFlowSteps) break;  // no one asks where the source ends
       decode(nonrigid_, rows, nonrigid_.flow);
-      nonrigid_.source += nonrigid_.flow;
+      nonrigid_.reached += nonrigid_.flow;
     }
     if (!of_source) {
       displacements = reached_ - queries;
@@ -114,7 +140,7 @@ class FlowModule : public Modules {
     for (std::size_t i = 0; i < nonrigid_.order.size(); ++i) {
       const auto sorted = static_cast<Eigen::Index>(i);
       const int given = nonrigid_.order[i];
-      displacements.col(given) = nonrigid_.source.col(sorted) - source.col(given);
+      displacements.col(given) = nonrigid_.reached.col(sorted) - source.col(given);
     }
   }
 
@@ -124,7 +150,7 @@ class FlowModule : public Modules {
  private:
   /// Of the source's points, RMS.
   float motion(const RigidStep& step) const {
-    const Points& points = rigid_.source;
+    const Points& points = rigid_.start;
     const Eigen::Matrix3f turn = step.rotation.toRotationMatrix() - Eigen::Matrix3f::Identity();
     float sum = 0.0F;
     for (Eigen::Index i = 0; i < points.cols(); ++i) {
@@ -135,7 +161,9 @@ class FlowModule : public Modules {
 
   /// Features of both clouds; returns what is read of the source.
   RowsView encode(FlowStage& stage) {
-    stage.surroundings.setClouds(stage.source, stage.target);
+    stage.fit = bestRigidFit(stage.start, stage.reached);
+    deformationInto(stage.fit, stage.start, stage.reached, stage.deformation);
+    stage.surroundings.setSource(stage.reached, stage.deformation);
     const RowsView rows = stage.surroundings.ofSource(stage.rows);
     source_encoder_.encode(rows, stage.features.data(), workspace_);
     target_encoder_.encode(stage.surroundings.ofTarget(), stage.features.data() + kFlowFeatureSize,
@@ -155,7 +183,7 @@ class FlowModule : public Modules {
             const Eigen::Map<const Eigen::Matrix<float, 3 + kFlowVectors, 1>> output(
                 outputs.data + i * outputs.stride);
             const Eigen::Map<const Eigen::Matrix<float, 3, kFlowVectors>> vectors(
-                rows.data + (begin + i) * rows.stride + kFlowInputs - 4 * kFlowVectors);
+                rows.data + (begin + i) * rows.stride + kFlowFirstVector);
             flow.col(begin + i) = output.head<3>() + vectors * output.tail<kFlowVectors>();
           }
         });
@@ -171,7 +199,7 @@ class FlowModule : public Modules {
                         "flow.decoder", static_cast<int>(kFlowDecoderWidths.size()),
                         kFlowInputs,    2 * kFlowFeatureSize};
   FlowStage rigid_{workspace_}, nonrigid_{workspace_};
-  Points reached_, query_flow_;
+  Points reached_, query_deformation_, query_flow_;
   std::vector<float> query_rows_;
 };
 

@@ -243,28 +243,34 @@ struct Loops {
     }
   }
 
-  /// One query a lane, as in `nearest`.
+  /// One query a lane, as in `nearest`. Some points at a time, so that the sums of one size stay in
+  /// registers over them.
   static void neighbourhoodSums(const float* queries, long query_count, const float* points,
                                 const float* values, long point_count, float exponent,
                                 float* sums) {
+    constexpr long kTile = 64;
+    Vector weights[kNeighbourhoods][kTile];
     for (long begin = 0; begin < query_count; begin += Lanes) {
       const long lanes = query_count - begin < Lanes ? query_count - begin : Lanes;
       Vector query[3];
       loadQueries(queries + 3 * begin, lanes, query);
       Vector totals[kNeighbourhoods][kAveraged] = {};
-      for (long point = 0; point < point_count; ++point) {
-        const Vector dx = query[0] - points[3 * point];
-        const Vector dy = query[1] - points[3 * point + 1];
-        const Vector dz = query[2] - points[3 * point + 2];
-        Vector weight = exponential(exponent * (dx * dx + dy * dy + dz * dz));
-#pragma GCC unroll 4
-        for (int size = 0; size < kNeighbourhoods; ++size) {
-#pragma GCC unroll 8
-          for (int k = 0; k < kAveraged; ++k) {
-            totals[size][k] += weight * values[kAveraged * point + k];
+      for (long first = 0; first < point_count; first += kTile) {
+        const long tile = point_count - first < kTile ? point_count - first : kTile;
+        for (long i = 0; i < tile; ++i) {
+          const float* point = points + 3 * (first + i);
+          const Vector dx = query[0] - point[0];
+          const Vector dy = query[1] - point[1];
+          const Vector dz = query[2] - point[2];
+          Vector weight = exponential(exponent * (dx * dx + dy * dy + dz * dz));
+          for (int size = 0; size < kNeighbourhoods; ++size) {
+            weights[size][i] = weight;
+            weight *= weight;
+            weight *= weight;
           }
-          weight *= weight;
-          weight *= weight;
+        }
+        for (int size = 0; size < kNeighbourhoods; ++size) {
+          addWeighted(weights[size], values + kAveraged * first, tile, totals[size]);
         }
       }
       float stored[kNeighbourhoods * kAveraged][Lanes];
@@ -275,6 +281,16 @@ struct Loops {
         for (int k = 0; k < kNeighbourhoods * kAveraged; ++k) *sums++ = stored[k][lane];
       }
     }
+  }
+
+  static void addWeighted(const Vector* weights, const float* values, long count, Vector* totals) {
+    Vector sum[kAveraged];
+    for (int k = 0; k < kAveraged; ++k) sum[k] = totals[k];
+    for (long i = 0; i < count; ++i) {
+#pragma GCC unroll 20
+      for (int k = 0; k < kAveraged; ++k) sum[k] += weights[i] * values[kAveraged * i + k];
+    }
+    for (int k = 0; k < kAveraged; ++k) totals[k] = sum[k];
   }
 
   static constexpr Kernels kernels(InstructionSet instruction_set) {

@@ -25,7 +25,7 @@ double flowMultiplyAdds(double sources, double targets, bool with_savings) {
 
 /// Of a cloud, those that the rigid stage of the flow module reads.
 double rigidPoints(Eigen::Index points) {
-  const Eigen::Index stride = (points + kFlowRigidPoints - 1) / kFlowRigidPoints;
+  const Eigen::Index stride = flowRigidStride(points);
   return static_cast<double>((points + stride - 1) / stride);
 }
 
@@ -36,9 +36,10 @@ double multiplyAdds(Eigen::Index source_points, Eigen::Index target_points, int 
   const auto sources = static_cast<double>(source_points);
   const auto targets = static_cast<double>(target_points);
   if (pairing == Pairing::kOffsets) {
-    return rigid_iterations * flowMultiplyAdds(rigidPoints(source_points),
-                                               rigidPoints(target_points), with_savings) +
-           kFlowSteps * flowMultiplyAdds(sources, targets, with_savings);
+    return kFlowSteps *
+           (rigid_iterations * flowMultiplyAdds(rigidPoints(source_points),
+                                                rigidPoints(target_points), with_savings) +
+            flowMultiplyAdds(sources, targets, with_savings));
   }
   const double rigid =
       multiplyAddsPerRow(3, kEncoderWidths) * (rigid_iterations * sources + targets) +

@@ -64,8 +64,7 @@ class PublishedModules : public Modules {
   const Kernels& kernels_ = workspace_.kernels();
   Encoder rigid_source_{kernels_, weights_, "rigid.source_encoder"};
   Encoder rigid_target_{kernels_, weights_, "rigid.target_encoder"};
-  RigidDecoder rigid_decoder_{kernels_, weights_, "rigid.decoder",
-                              static_cast<int>(kRigidDecoderWidths.size())};
+  RigidDecoder rigid_decoder_{kernels_, weights_};
   Encoder nonrigid_source_{kernels_, weights_, "nonrigid.source_encoder"};
   Encoder nonrigid_target_{kernels_, weights_, "nonrigid.target_encoder"};
   PointDecoder nonrigid_decoder_{kernels_,

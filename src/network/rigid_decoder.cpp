@@ -11,9 +11,9 @@ constexpr float kMinNorm = 1e-12F;
 
 }  // namespace
 
-RigidDecoder::RigidDecoder(const Kernels& kernels, const Weights& weights, const std::string& name,
-                           int layers)
-    : layers_(packLayers(kernels, weights, name, 0, layers - 1, Activation::kNone)) {
+RigidDecoder::RigidDecoder(const Kernels& kernels, const Weights& weights)
+    : layers_(packLayers(kernels, weights, "rigid.decoder", 0,
+                         static_cast<int>(kRigidDecoderWidths.size()) - 1, Activation::kNone)) {
   std::size_t widest = 0;
   for (const DenseLayer& layer : layers_) {
     widest = std::max(widest, layer.paddedOutputs());

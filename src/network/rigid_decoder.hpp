@@ -18,8 +18,7 @@ struct RigidStep {
 /// Reads a step off the features of the moved source and the target.
 class RigidDecoder {
  public:
-  /// Of `layers` layers, NAME.0 and on.
-  RigidDecoder(const Kernels& kernels, const Weights& weights, const std::string& name, int layers);
+  RigidDecoder(const Kernels& kernels, const Weights& weights);
 
   /// `features`: of the source, then of the target. Throws std::runtime_error where the quaternion
   /// cannot be normalised.

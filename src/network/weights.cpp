@@ -212,7 +212,7 @@ void writeWeights(const Weights& weights, const std::string& path) {
 }
 
 Weights randomWeights(Pairing pairing, unsigned seed) {
-  constexpr double kLastLayerScale = 0.05, kLastFlowScale = 0.01;
+  constexpr double kLastLayerScale = 0.05, kLastFlowScale = 0.005;
   constexpr float kOffsetScale = 10.0F;  // offsets are shorter than points by as much
   Random random(seed);
   Weights weights;
@@ -230,8 +230,7 @@ Weights randomWeights(Pairing pairing, unsigned seed) {
       return static_cast<float>(deviation * random.normal());
     });
     if (shape.name == "flow.source_encoder.0" || shape.name == "flow.decoder.0") {
-      constexpr int kOffsetColumns = 4 * kFlowVectors;
-      layer.weight.middleCols(kFlowInputs - kOffsetColumns, kOffsetColumns) *= kOffsetScale;
+      layer.weight.middleCols(kFlowFirstVector, 4 * kFlowVectors) *= kOffsetScale;
     }
     if (shape.name == "flow.target_encoder.0") layer.weight.rightCols(3) *= kOffsetScale;
     layer.bias = Eigen::VectorXf::Zero(shape.outputs);

@@ -85,7 +85,12 @@ Batch stack(const std::vector<RegistrationPair>& pairs) {
     rigid.push_back(toTensor(unit.apply(moved(pair.best_rigid, pair.source))));
     scale.push_back(unit.scale);
   }
-  return {torch::stack(source), torch::stack(target), torch::stack(truth), torch::stack(rigid),
+  const auto sources = torch::stack(source);
+  return {sources,
+          sources,
+          torch::stack(target),
+          torch::stack(truth),
+          torch::stack(rigid),
           torch::tensor(scale)};
 }
 

@@ -20,6 +20,7 @@ namespace unirit::training {
 /// Pairs in the network's unit, [B, N, 3] each.
 struct Batch {
   torch::Tensor source;
+  torch::Tensor start;  ///< where it stood when the flow began to move it; the same in a new batch
   torch::Tensor target;
   torch::Tensor truth;  ///< where each source point truly went
   torch::Tensor rigid;  ///< where the best rigid fit takes it

@@ -31,7 +31,7 @@ torch::Tensor rotationOf(const torch::Tensor& quaternion) {
 
 /// What the rigid stage of the flow module reads of clouds, [B, N, 3].
 torch::Tensor thinned(const torch::Tensor& points) {
-  const std::int64_t stride = (points.size(1) + kFlowRigidPoints - 1) / kFlowRigidPoints;
+  const std::int64_t stride = flowRigidStride(points.size(1));
   if (stride == 1) return points;
   const auto order = points.select(2, 0).argsort(1, false).slice(1, 0, c10::nullopt, stride);
   return points.gather(1, order.unsqueeze(2).expand({-1, -1, 3}));
@@ -136,9 +136,10 @@ FlowModuleImpl::FlowModuleImpl()
           "decoder",
           Perceptron(stack(kFlowInputs + 2 * kFlowFeatureSize, kFlowDecoderWidths), true))) {}
 
-torch::Tensor FlowModuleImpl::forward(const torch::Tensor& moved_source,
+torch::Tensor FlowModuleImpl::forward(const torch::Tensor& start, const torch::Tensor& reached,
                                       const torch::Tensor& target) {
-  const Surroundings read = surroundings(moved_source, target);
+  const auto deformation = reached - bestRigidFit(start, reached).apply(start);
+  const Surroundings read = surroundings(reached, deformation, target);
   const auto features = torch::cat(
       {source_encoder_->forward(read.of_source), target_encoder_->forward(read.of_target)}, 1);
   const auto first = decoder_->layer(0);
@@ -146,7 +147,10 @@ torch::Tensor FlowModuleImpl::forward(const torch::Tensor& moved_source,
   const auto global = torch::linear(features, columns[1], first->bias);
   const auto output =
       decoder_->continueFrom(torch::linear(read.of_source, columns[0]) + global.unsqueeze(1));
-  return output.slice(2, 0, 3) + (output.slice(2, 3).unsqueeze(3) * read.vectors).sum(2);
+  const auto vectors =
+      read.of_source.slice(2, kFlowFirstVector, kFlowFirstVector + 3 * kFlowVectors)
+          .unflatten(2, {kFlowVectors, 3});
+  return output.slice(2, 0, 3) + (output.slice(2, 3).unsqueeze(3) * vectors).sum(2);
 }
 
 UniritImpl::UniritImpl(Pairing pairing) : pairing_(pairing) {
@@ -171,7 +175,11 @@ torch::Tensor UniritImpl::moveRigidly(const torch::Tensor& source, const torch::
   torch::Tensor some = thinned(source);
   torch::Tensor going_on = torch::ones({source.size(0), 1, 1}, source.options()).to(torch::kBool);
   for (int i = 0; i < iterations; ++i) {
-    const Pose step = bestRigidFit(some, some + flow->forward(some, some_of_target));
+    auto deformed = some;
+    for (int k = 0; k < kFlowSteps; ++k) {
+      deformed = deformed + flow->forward(some, deformed, some_of_target);
+    }
+    const Pose step = bestRigidFit(some, deformed);
     const auto reached = step.apply(some);
     const auto motion = (reached - some).square().sum(2, true).mean(1, true).sqrt();
     moved = torch::where(going_on, step.apply(moved), moved);
@@ -184,7 +192,7 @@ torch::Tensor UniritImpl::moveRigidly(const torch::Tensor& source, const torch::
 torch::Tensor UniritImpl::deform(const torch::Tensor& moved_source, const torch::Tensor& target) {
   if (!flow) return moved_source + nonrigid->forward(moved_source, target);
   torch::Tensor moved = moved_source;
-  for (int i = 0; i < kFlowSteps; ++i) moved = moved + flow->forward(moved, target);
+  for (int i = 0; i < kFlowSteps; ++i) moved = moved + flow->forward(moved_source, moved, target);
   return moved;
 }
 

@@ -82,11 +82,13 @@ class NonRigidModuleImpl : public torch::nn::Module {
 };
 TORCH_MODULE(NonRigidModule);
 
-/// The module of pairing offsets, of both stages: the flow of the moved source, [B, N, 3].
+/// The module of pairing offsets, of both stages: the flow of the source, [B, N, 3], from where it
+/// has reached since it began.
 class FlowModuleImpl : public torch::nn::Module {
  public:
   FlowModuleImpl();
-  torch::Tensor forward(const torch::Tensor& moved_source, const torch::Tensor& target);
+  torch::Tensor forward(const torch::Tensor& start, const torch::Tensor& reached,
+                        const torch::Tensor& target);
 
  private:
   Encoder source_encoder_, target_encoder_;

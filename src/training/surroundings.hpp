@@ -11,14 +11,15 @@ torch::Tensor offsets(const torch::Tensor& from, const torch::Tensor& to);
 /// What the flow module reads of two clouds, as architecture.hpp lists it.
 struct Surroundings {
   torch::Tensor of_source;  ///< [B, N, kFlowInputs]
-  torch::Tensor vectors;    ///< [B, N, kFlowVectors, 3], that of_source ends with
   torch::Tensor of_target;  ///< [B, M, kFlowTargetInputs]
 };
 
 /// Of source, [B, N, 3], and target, [B, M, 3]; no gradient passes through.
-Surroundings surroundings(const torch::Tensor& source, const torch::Tensor& target);
+Surroundings surroundings(const torch::Tensor& source, const torch::Tensor& deformation,
+                          const torch::Tensor& target);
 
 /// The same by LibTorch's operations alone, as other devices need it.
-Surroundings onAnyDevice(const torch::Tensor& source, const torch::Tensor& target);
+Surroundings onAnyDevice(const torch::Tensor& source, const torch::Tensor& deformation,
+                         const torch::Tensor& target);
 
 }  // namespace unirit::training

@@ -35,8 +35,8 @@ torch::Tensor distance(Loss loss, const torch::Tensor& moved, const torch::Tenso
 
 template <class Function>
 Batch transformed(const Batch& batch, Function&& function) {
-  return {function(batch.source), function(batch.target), function(batch.truth),
-          function(batch.rigid), function(batch.scale)};
+  return {function(batch.source), function(batch.start), function(batch.target),
+          function(batch.truth),  function(batch.rigid), function(batch.scale)};
 }
 
 Batch slice(const Batch& batch, std::int64_t first, std::int64_t last) {
@@ -60,10 +60,8 @@ struct Outcome {
 Outcome pass(Unirit& model, const Batch& batch, const TrainingSettings& settings, Stage stage) {
   const bool rigid = stage == Stage::kRigid;
   if (model->flow) {
-    const auto moved = batch.source + model->flow->forward(batch.source, batch.target);
-    const auto reached = moved.detach();
-    return {distance(settings.loss, moved, batch.truth, batch.target),
-            rigid ? bestRigidFit(batch.source, reached).apply(batch.source) : reached};
+    const auto moved = batch.source + model->flow->forward(batch.start, batch.source, batch.target);
+    return {distance(settings.loss, moved, batch.truth, batch.target), moved.detach()};
   }
   if (rigid) {
     torch::Tensor target_feature;
@@ -121,10 +119,10 @@ torch::Tensor update(Unirit& model, torch::optim::Adam& optimiser, Batch& batch,
   return torch::stack(losses).sum();
 }
 
-/// One step: an update for every iteration of the rigid stage, each on the output of the one
-/// before, so that it has seen what it will be given, then those of the non-rigid stage. What
-/// passes between them is detached and Adam does not see a loss's scale, so alpha between 0 and 1
-/// weighs only what is returned, the paper's L_total.
+/// One step: an update for every iteration of the rigid stage, by flow for every step of it, each
+/// on the output of the one before, so that it has seen what it will be given, then those of the
+/// non-rigid stage. What passes between them is detached and Adam does not see a loss's scale, so
+/// alpha between 0 and 1 weighs only what is returned, the paper's L_total.
 torch::Tensor learn(Unirit& model, torch::optim::Adam& optimiser, Batch batch,
                     const TrainingSettings& settings, std::int64_t step) {
   const double alpha = step < settings.rigid_steps ? 0.0 : settings.alpha;
@@ -132,10 +130,14 @@ torch::Tensor learn(Unirit& model, torch::optim::Adam& optimiser, Batch batch,
   const auto add = [&](Stage stage, int passes, double weight) {
     for (int i = 0; i < passes; ++i) {
       loss += weight / passes * update(model, optimiser, batch, settings, stage);
+      if (model->flow && stage == Stage::kRigid && (i + 1) % kFlowSteps == 0) {
+        batch.source = batch.start = bestRigidFit(batch.start, batch.source).apply(batch.start);
+      }
     }
   };
-  if (alpha < 1.0) add(Stage::kRigid, iterationsAt(settings, step), 1.0 - alpha);
-  if (alpha > 0.0) add(Stage::kNonRigid, model->flow ? kFlowSteps : 1, alpha);
+  const int steps = model->flow ? kFlowSteps : 1;
+  if (alpha < 1.0) add(Stage::kRigid, steps * iterationsAt(settings, step), 1.0 - alpha);
+  if (alpha > 0.0) add(Stage::kNonRigid, steps, alpha);
   return loss;
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
+#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
@@ -34,13 +35,17 @@ inline Eigen::MatrixXd decode(const Weights& weights, const std::string& name,
   return values;
 }
 
+inline Eigen::Index nearest(const Eigen::Vector3d& point, const Eigen::Matrix3Xd& others) {
+  Eigen::Index nearest = 0;
+  (others.colwise() - point).colwise().squaredNorm().minCoeff(&nearest);
+  return nearest;
+}
+
 /// From each point to the nearest of the others.
 inline Eigen::Matrix3Xd offsets(const Eigen::Matrix3Xd& points, const Eigen::Matrix3Xd& others) {
   Eigen::Matrix3Xd offsets(3, points.cols());
   for (Eigen::Index i = 0; i < points.cols(); ++i) {
-    Eigen::Index nearest = 0;
-    (others.colwise() - points.col(i)).colwise().squaredNorm().minCoeff(&nearest);
-    offsets.col(i) = others.col(nearest) - points.col(i);
+    offsets.col(i) = others.col(nearest(points.col(i), others)) - points.col(i);
   }
   return offsets;
 }
@@ -63,25 +68,71 @@ inline Eigen::VectorXd features(const Weights& weights, const std::string& modul
   return both;
 }
 
+/// A cloud of the source's frame on its way along the flow.
+struct MovingCloud {
+  explicit MovingCloud(const Eigen::Matrix3Xd& points) : start(points), reached(points) {}
+
+  /// What the best rigid fit of the source leaves of its way.
+  Eigen::Matrix3Xd deformation(const MovingCloud& source) const {
+    const Eigen::Isometry3d fit(Eigen::umeyama(source.start, source.reached, false));
+    return reached - fit * start;
+  }
+
+  Eigen::Matrix3Xd start, reached;
+};
+
+/// The directions in which the points about each vary least.
+inline Eigen::Matrix3Xd normals(const Eigen::Matrix3Xd& points) {
+  Eigen::Matrix3Xd normals(3, points.cols());
+  for (Eigen::Index j = 0; j < points.cols(); ++j) {
+    const Eigen::RowVectorXd weights =
+        (-0.5 / std::pow(kFlowScales.back(), 2) *
+         (points.colwise() - points.col(j)).colwise().squaredNorm().array())
+            .exp();
+    const Eigen::Vector3d mean = points * weights.transpose() / weights.sum();
+    const Eigen::Matrix3Xd rest = points.colwise() - mean;
+    const Eigen::Matrix3d covariance = rest * weights.asDiagonal() * rest.transpose();
+    normals.col(j) =
+        Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(covariance).eigenvectors().col(0);
+  }
+  return normals;
+}
+
 /// What the flow module reads of each of `queries`, among the source's points.
-inline Eigen::MatrixXd surroundings(const Eigen::Matrix3Xd& source, const Eigen::Matrix3Xd& target,
-                                    const Eigen::Matrix3Xd& queries) {
+inline Eigen::MatrixXd surroundings(const MovingCloud& moving_source,
+                                    const Eigen::Matrix3Xd& target,
+                                    const MovingCloud& moving_queries) {
+  const Eigen::Matrix3Xd &source = moving_source.reached, &queries = moving_queries.reached;
+  const Eigen::Matrix3Xd deformation = moving_source.deformation(moving_source);
+  const Eigen::Matrix3Xd of_queries = moving_queries.deformation(moving_source);
   const Eigen::Matrix3Xd to_target = offsets(source, target), to_source = offsets(target, source);
+  const Eigen::Matrix3Xd target_normals = normals(target);
+  Eigen::Matrix3Xd source_normals(3, source.cols());
+  for (Eigen::Index i = 0; i < source.cols(); ++i) {
+    source_normals.col(i) = target_normals.col(nearest(source.col(i), target));
+  }
   const double ratio = static_cast<double>(source.cols()) / static_cast<double>(target.cols());
   Eigen::MatrixXd inputs(kFlowInputs, queries.cols());
   for (Eigen::Index q = 0; q < queries.cols(); ++q) {
     const Eigen::Vector3d query = queries.col(q);
-    std::vector<Eigen::Vector3d> vectors{offsets(query, target)};
+    std::vector<Eigen::Vector3d> vectors{offsets(query, target), of_queries.col(q)};
     std::vector<double> shares;
     for (const double scale : kFlowScales) {
       const auto weightAt = [&](const Eigen::Vector3d& point) {
         return std::exp(-0.5 * (point - query).squaredNorm() / (scale * scale));
       };
-      Eigen::Vector3d forth = Eigen::Vector3d::Zero(), back = Eigen::Vector3d::Zero();
+      Eigen::Vector3d forth = Eigen::Vector3d::Zero(), back = forth, deformed = forth;
+      Eigen::Vector3d to_plane = Eigen::Vector3d::Zero();
+      Eigen::Matrix3d planes = Eigen::Matrix3d::Zero();
       double of_source = 0.0, of_target = 0.0;
       for (Eigen::Index i = 0; i < source.cols(); ++i) {
-        forth += weightAt(source.col(i)) * to_target.col(i);
-        of_source += weightAt(source.col(i));
+        const double weight = weightAt(source.col(i));
+        const Eigen::Matrix3d plane = source_normals.col(i) * source_normals.col(i).transpose();
+        forth += weight * to_target.col(i);
+        deformed += weight * deformation.col(i);
+        planes += weight * plane;
+        to_plane += weight * plane * to_target.col(i);
+        of_source += weight;
       }
       for (Eigen::Index j = 0; j < target.cols(); ++j) {
         const double weight = weightAt(target.col(j) + to_source.col(j));
@@ -90,6 +141,9 @@ inline Eigen::MatrixXd surroundings(const Eigen::Matrix3Xd& source, const Eigen:
       }
       vectors.push_back(forth / of_source);
       vectors.push_back(back / (of_target + kFlowFewest));
+      vectors.push_back(deformed / of_source);
+      const Eigen::Matrix3d ridge = kFlowPlaneRidge * Eigen::Matrix3d::Identity();
+      vectors.push_back((planes / of_source + ridge).ldlt().solve(to_plane / of_source));
       shares.push_back(ratio * of_target / of_source);
     }
     Eigen::Index row = 0;
@@ -103,22 +157,32 @@ inline Eigen::MatrixXd surroundings(const Eigen::Matrix3Xd& source, const Eigen:
   return inputs;
 }
 
-inline Eigen::Matrix3Xd flow(const Weights& weights, const Eigen::Matrix3Xd& source,
-                             const Eigen::Matrix3Xd& target, const Eigen::Matrix3Xd& queries) {
+inline Eigen::Matrix3Xd flow(const Weights& weights, const MovingCloud& source,
+                             const Eigen::Matrix3Xd& target, const MovingCloud& queries) {
   Eigen::MatrixXd of_target(kFlowTargetInputs, target.cols());
-  of_target << target, offsets(target, source);
+  of_target << target, offsets(target, source.reached);
   const Eigen::VectorXd both =
       features(weights, "flow", surroundings(source, target, source), of_target);
   const Eigen::MatrixXd read = surroundings(source, target, queries);
-  Eigen::MatrixXd inputs(kFlowInputs + both.size(), queries.cols());
-  inputs << read, both.replicate(1, queries.cols());
+  Eigen::MatrixXd inputs(kFlowInputs + both.size(), queries.reached.cols());
+  inputs << read, both.replicate(1, queries.reached.cols());
   const Eigen::MatrixXd outputs = decode(weights, "flow.decoder", inputs);
   Eigen::Matrix3Xd moved = outputs.topRows(3);
   for (int k = 0; k < kFlowVectors; ++k) {
-    const auto vectors = read.middleRows(3 + kFlowScales.size() + 3 * k, 3);
+    const auto vectors = read.middleRows(kFlowFirstVector + 3 * k, 3);
     moved += vectors * outputs.row(3 + k).asDiagonal();
   }
   return moved;
+}
+
+/// Moves source and queries along the flow, as often as a stage does.
+inline void followFlow(const Weights& weights, MovingCloud& source, const Eigen::Matrix3Xd& target,
+                       MovingCloud& queries) {
+  for (int step = 0; step < kFlowSteps; ++step) {
+    const Eigen::Matrix3Xd of_source = flow(weights, source, target, source);
+    queries.reached += flow(weights, source, target, queries);
+    source.reached += of_source;
+  }
 }
 
 /// What the rigid stage of the flow module reads of a cloud.
@@ -130,7 +194,7 @@ inline Points thinned(const Points& points) {
   std::sort(sorted.begin(), sorted.end(), [](const auto& a, const auto& b) {
     return std::tie(a[0], a[1], a[2]) < std::tie(b[0], b[1], b[2]);
   });
-  const std::size_t stride = (sorted.size() + kFlowRigidPoints - 1) / kFlowRigidPoints;
+  const auto stride = static_cast<std::size_t>(flowRigidStride(points.cols()));
   Points kept(3, static_cast<Eigen::Index>((sorted.size() + stride - 1) / stride));
   for (Eigen::Index i = 0; i < kept.cols(); ++i) {
     kept.col(i) = sorted[static_cast<std::size_t>(i) * stride];
@@ -151,7 +215,9 @@ inline std::vector<Eigen::Isometry3d> estimateRigid(const Weights& weights,
     const Eigen::Matrix3Xd moved = transform * source.cast<double>();
     Eigen::Isometry3d step;
     if (by_flow) {
-      step = Eigen::umeyama(moved, moved + flow(weights, moved, target, moved), false);
+      MovingCloud cloud(moved), none(Eigen::Matrix3Xd(3, 0));
+      followFlow(weights, cloud, target, none);
+      step = Eigen::umeyama(cloud.start, cloud.reached, false);
     } else {
       const Eigen::VectorXd pose =
           decode(weights, "rigid.decoder", features(weights, "rigid", moved, target));
@@ -169,14 +235,13 @@ inline std::vector<Eigen::Isometry3d> estimateRigid(const Weights& weights,
 inline Eigen::Matrix3Xd estimateDisplacements(const Weights& weights, const Points& source_points,
                                               const Points& target_points,
                                               const Points& query_points) {
-  Eigen::Matrix3Xd source = source_points.cast<double>(), queries = query_points.cast<double>();
+  const Eigen::Matrix3Xd source = source_points.cast<double>();
+  const Eigen::Matrix3Xd queries = query_points.cast<double>();
   const Eigen::Matrix3Xd target = target_points.cast<double>();
   if (weights.pairing == Pairing::kOffsets) {
-    for (int step = 0; step < kFlowSteps; ++step) {
-      queries += flow(weights, source, target, queries);
-      source += flow(weights, source, target, source);
-    }
-    return queries - query_points.cast<double>();
+    MovingCloud cloud(source), moving_queries(queries);
+    followFlow(weights, cloud, target, moving_queries);
+    return moving_queries.reached - queries;
   }
   const Eigen::VectorXd both = features(weights, "nonrigid", source, target);
   Eigen::MatrixXd inputs(nonRigidDecoderInputs(weights.pairing), queries.cols());
@@ -197,7 +262,7 @@ inline std::shared_ptr<const Weights> makeLoudWeights(Pairing pairing) {
     }
   }
   if (pairing == Pairing::kOffsets) {
-    weights->layers.at("flow.decoder.3").weight *= 1.5F;
+    weights->layers.at("flow.decoder.3").weight *= 3.0F;
   } else {
     weights->layers.at("nonrigid.decoder.5").weight *= 20.0F;
   }
@@ -217,6 +282,16 @@ inline std::shared_ptr<const Weights> loudWeights(Pairing pairing) {
 inline Points randomPoints(Eigen::Index count, std::uint64_t seed) {
   Random random(seed);
   return Points::NullaryExpr(3, count, [&] { return static_cast<float>(random.uniform(-1, 1)); });
+}
+
+/// Points on an ellipsoid: normals that no rounding turns.
+inline Points surfacePoints(Eigen::Index count, std::uint64_t seed) {
+  Random random(seed);
+  Points points(3, count);
+  for (Eigen::Index i = 0; i < count; ++i) {
+    points.col(i) = random.direction().cwiseProduct(Eigen::Vector3d(0.5, 0.35, 0.25)).cast<float>();
+  }
+  return points;
 }
 
 /// A permutation of 0 .. count - 1.

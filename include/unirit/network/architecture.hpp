@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -18,29 +19,41 @@ inline constexpr std::array<int, 6> kNonRigidDecoderWidths{1024, 512, 256, 128, 
 inline constexpr int kFeatureSize = 1024;
 
 /// With pairing offsets one smaller module does both stages: it tells the way each point of the
-/// source has to go, its scene flow, of which a rigid iteration takes the best rigid fit. Beside a
-/// point it reads where the clouds lie to each other about it: vectors to the nearest point of the
-/// other cloud and their means over neighbourhoods of several sizes, either way.
-inline constexpr std::array<int, 5> kFlowEncoderWidths{32, 64, 64, 128, 256};
+/// source has still to go, its scene flow, and is asked again from where that has led. An iteration
+/// of the rigid stage is the best rigid fit of a few such steps. Beside a point the module reads
+/// where the clouds lie to each other about it: vectors to the nearest point of the other cloud,
+/// either way, over neighbourhoods of several sizes, and the shortest way to the planes on which
+/// the target's points lie there; and how the steps so far have deformed the source, which is what
+/// their best rigid fit leaves of them.
+inline constexpr std::array<int, 5> kFlowEncoderWidths{64, 64, 64, 128, 256};
 inline constexpr int kFlowFeatureSize = kFlowEncoderWidths.back();
 inline constexpr std::array<float, 4> kFlowScales{0.8F, 0.4F, 0.2F, 0.1F};  ///< half extents
 /// Weight of the target's points below which their mean vector fades to zero.
 inline constexpr float kFlowFewest = 0.01F;
-inline constexpr int kFlowVectors = 1 + 2 * static_cast<int>(kFlowScales.size());
+/// Weight of staying where one is, beside the target's planes, in the way to them.
+inline constexpr float kFlowPlaneRidge = 0.05F;
+inline constexpr int kFlowVectors = 2 + 4 * static_cast<int>(kFlowScales.size());
 /// Point (3), for each scale the share of the target found there, the vectors, their lengths.
-inline constexpr int kFlowInputs = 3 + static_cast<int>(kFlowScales.size()) + 4 * kFlowVectors;
+inline constexpr int kFlowFirstVector = 3 + static_cast<int>(kFlowScales.size());
+inline constexpr int kFlowInputs = kFlowFirstVector + 4 * kFlowVectors;
 /// What is read beside a point of the target: itself (3) and the vector to the source's nearest.
 inline constexpr int kFlowTargetInputs = 6;
 /// A displacement, and how much of each vector is added to it.
-inline constexpr std::array<int, 4> kFlowDecoderWidths{128, 128, 64, 3 + kFlowVectors};
+inline constexpr std::array<int, 4> kFlowDecoderWidths{128, 128, 128, 3 + kFlowVectors};
 /// Points of each cloud, at most, that the rigid stage reads: evenly chosen ones of more, every so
 /// many in the order of their coordinates.
 inline constexpr int kFlowRigidPoints = 512;
+
+/// Every how manieth of so many points the rigid stage reads.
+constexpr std::int64_t flowRigidStride(std::int64_t points) {
+  return (points + kFlowRigidPoints - 1) / kFlowRigidPoints;
+}
+
 /// Iterations of the rigid stage end after one that moves these points by less than this, RMS [half
 /// extents]: those that followed would drift.
-inline constexpr float kFlowConverged = 0.02F;
-/// Times that the non-rigid stage moves the source along its flow.
-inline constexpr int kFlowSteps = 2;
+inline constexpr float kFlowConverged = 0.015F;
+/// Steps along the flow: of each iteration of the rigid stage, and of the non-rigid stage.
+inline constexpr int kFlowSteps = 3;
 
 /// Inputs of the non-rigid decoder: point (3), two global features (2048), paired row (3 or none).
 constexpr int nonRigidDecoderInputs(Pairing pairing) {
