@@ -48,15 +48,15 @@ Eigen::Vector3f directionOfLeastVariance(const Eigen::Vector3f& mean, const Tria
 
 void Surroundings::setTarget(const Points& target) {
   target_ = target;
-  values_.setZero(kAveraged, target.cols());
+  target_values_.setZero(kAveraged, target.cols());
   for (Eigen::Index j = 0; j < target.cols(); ++j) {
-    values_.col(j).head<10>() << target.col(j), 1.0F, triangleOf(target.col(j));
+    target_values_.col(j).head<10>() << target.col(j), 1.0F, triangleOf(target.col(j));
   }
   target_normals_.resize(3, target.cols());
   workspace_.forEachBlock(target.cols(), [&](Scratch&, long begin, long count) {
     float sums[kBlockRows * kNeighbourhoods * kAveraged];
     workspace_.kernels().neighbourhoodSums(target.data() + 3 * begin, count, target.data(),
-                                           values_.data(), target.cols(),
+                                           target_values_.data(), target.cols(),
                                            exponentOf(kFlowScales.back()), sums);
     for (long j = 0; j < count; ++j) {
       const Eigen::Map<const Eigen::Matrix<float, 10, 1>> sum(sums + kNeighbourhoods * kAveraged *

@@ -38,7 +38,7 @@ class Surroundings {
   Points source_, deformation_, target_, target_normals_;
   std::vector<int> nearest_target_, nearest_source_;  // of each source, of each target point
   Eigen::Matrix<float, kFlowTargetInputs, Eigen::Dynamic> of_target_;
-  Eigen::Matrix<float, kAveraged, Eigen::Dynamic> values_;  // of points, to be averaged
+  Eigen::Matrix<float, kAveraged, Eigen::Dynamic> values_, target_values_;  // to be averaged
 };
 
 }  // namespace unirit

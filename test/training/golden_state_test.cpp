@@ -17,7 +17,7 @@ constexpr float kTolerance = 1e-4F;  // of the cloud's extent, which is 2 in the
 Weights strongWeights(Pairing pairing) {
   Weights weights = randomWeights(pairing, 7);
   if (pairing == Pairing::kOffsets) {
-    weights.layers.at("flow.decoder.3").weight *= 2.0F;
+    weights.layers.at("flow.decoder.3").weight *= 2.5F;
     return weights;
   }
   weights.layers.at("rigid.decoder.5").weight *= 3.0F;
@@ -52,9 +52,12 @@ class GoldenState : public testing::TestWithParam<Pairing> {
     model_->setWeights(*weights_);
     NetworkSettings settings;
     settings.pairing = GetParam();
+    settings.rigid_iterations = iterations_;
     network_ = std::make_unique<Network>(weights_, settings, 2);
   }
 
+  // By flow of three steps each, through which random weights multiply what rounding does
+  const int iterations_ = GetParam() == Pairing::kOffsets ? 3 : 8;
   const Points source_ = cloud(700, 1);
   const Points target_ = cloud(GetParam() == Pairing::kRow ? 700 : 900, 2);
   std::shared_ptr<const Weights> weights_;
@@ -67,7 +70,7 @@ TEST_P(GoldenState, RigidStageAgreesAfterEveryIteration) {
   std::vector<Eigen::Isometry3f> iterates;
   network_->estimateRigid(source_, target_, &iterates);
   const torch::Tensor target = toTensor(target_);
-  ASSERT_EQ(iterates.size(), 8U);
+  ASSERT_EQ(iterates.size(), static_cast<std::size_t>(iterations_));
   torch::Tensor moved;
   for (std::size_t i = 0; i < iterates.size(); ++i) {
     moved = model_->moveRigidly(toTensor(source_), target, static_cast<int>(i) + 1);
@@ -90,7 +93,7 @@ TEST_P(GoldenState, WholeNetworkAgrees) {
   const Points moved = network_->estimateRigid(source_, target_) * source_;
   const Points ours = moved + network_->estimateDisplacements(moved, target_, moved);
   const torch::Tensor target = toTensor(target_);
-  const torch::Tensor source = model_->moveRigidly(toTensor(source_), target, 8);
+  const torch::Tensor source = model_->moveRigidly(toTensor(source_), target, iterations_);
   const auto theirs = model_->deform(source, target);
   EXPECT_LT((ours - toPoints(theirs)).cwiseAbs().maxCoeff(), 2.0F * kTolerance);
 }
