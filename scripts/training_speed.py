@@ -244,7 +244,7 @@ def train_with_torch(options):
     network = nn.ModuleDict({"rigid": Rigid(), "nonrigid": NonRigid()}
                             if pairing == "nearest" else {"flow": Flow()})
     assert sum(p.numel() for p in network.parameters()) == PARAMETERS[pairing]
-    optimiser = torch.optim.Adam(network.parameters(), 1e-3)
+    optimiser = torch.optim.Adam(network.parameters(), 1e-5)  # more would diverge on noise
     source, target, truth, rigid = torch.rand(4, options.batch, options.points, 3) * 2 - 1
 
     def update(loss):
