@@ -1,8 +1,9 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: BSD-3-Clause
 # Usage: test.sh
-# Sets up, builds, and runs every test with no display; again, the unit tests with the address and
-# undefined behaviour sanitizers. The last line is "N passed, N failed"; exit status 0 if none did.
+# Sets up, builds, and runs every test with no display; again, the unit tests but those of two slow
+# tools with the address and undefined behaviour sanitizers. The last line is "N passed, N failed";
+# exit status 0 if none did.
 set -euo pipefail
 source "$(dirname "${BASH_SOURCE[0]}")/setup.sh"
 
