@@ -30,7 +30,7 @@ FLOW_ENCODER = [64, 64, 64, 128, 256]
 FLOW_SCALES = [0.8, 0.4, 0.2, 0.1]
 FLOW_INPUTS, FLOW_TARGET_INPUTS = 79, 6
 FLOW_DECODER = [FLOW_INPUTS + 512, 128, 128, 128, 21]
-FLOW_STEPS = 3
+FLOW_COARSE_POINTS, FLOW_COARSE_STEPS, FLOW_FINE_STEPS = 320, 3, 6
 PARAMETERS = {"nearest": 7466122, "offsets": 216405}
 PHASES = {"rigid": ("nearest", 0.0), "both": ("nearest", 0.5),
           "flow": ("offsets", 0.5)}  # pairing and weight of the global loss
@@ -214,7 +214,7 @@ def train_with_torch(options):
         def forward(self, start, moved, target):
             with torch.no_grad():
                 of_source, vectors, of_target = surroundings(
-                    moved, moved - best_rigid_fit(start, moved), target)
+                    moved, moved - best_rigid_fit(start, moved, start), target)
             features = torch.cat([self.source(of_source), self.target(of_target)], 1)
             first = self.decoder[0]
             point, columns = first.weight.split([FLOW_INPUTS, 512], 1)
@@ -223,14 +223,14 @@ def train_with_torch(options):
             output = run_layers(self.decoder[1:], torch.relu(values))
             return output[:, :, :3] + (output[:, :, 3:].unsqueeze(3) * vectors).sum(2)
 
-    def best_rigid_fit(source, moved):
+    def best_rigid_fit(source, moved, points):
         source_centre, centre = source.mean(1, True), moved.mean(1, True)
         covariance = (source - source_centre).transpose(1, 2) @ (moved - centre)
         u, _, vt = torch.linalg.svd(covariance.double(), full_matrices=False)
         v = vt.transpose(1, 2).clone()
         v[:, :, 2] *= torch.linalg.det(u @ vt).sign().unsqueeze(1)
         rotation = (v @ u.transpose(1, 2)).float()
-        return (source - source_centre) @ rotation.transpose(1, 2) + centre
+        return (points - source_centre) @ rotation.transpose(1, 2) + centre
 
     def of_points(index):
         return index.unsqueeze(2).expand(-1, -1, 3)
@@ -266,13 +266,15 @@ def train_with_torch(options):
 
     def step_flow():
         start = source
-        for _ in range(options.iterations + 1):  # the last is the non-rigid stage
-            moved = start
-            for _ in range(FLOW_STEPS):
-                reached = moved + network["flow"](start, moved, target)
-                update(root_mean_square(reached - truth))
+        for i in range(options.iterations + 1):  # the last is the non-rigid stage
+            coarse = i < options.iterations - 1
+            read = slice(FLOW_COARSE_POINTS if coarse else None)
+            moved = start[:, read]
+            for _ in range(FLOW_COARSE_STEPS if coarse else FLOW_FINE_STEPS):
+                reached = moved + network["flow"](start[:, read], moved, target[:, read])
+                update(root_mean_square(reached - truth[:, read]))
                 moved = reached.detach()
-            start = best_rigid_fit(start, moved)
+            start = best_rigid_fit(start[:, read], moved, start)
 
     step = step_published if pairing == "nearest" else step_flow
     for _ in range(options.steps // 3 + 1):

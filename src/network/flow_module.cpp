@@ -2,6 +2,7 @@
 #include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 #include <stdexcept>
 
@@ -13,17 +14,17 @@
 namespace unirit {
 namespace {
 
-/// The order of the points' coordinates, so that none given to them counts, of every `stride`-th.
-void orderPoints(const Points& points, std::int64_t stride, std::vector<int>& order) {
+/// So many evenly chosen points, all where they are fewer, in the order of their coordinates, so
+/// that none given to them counts.
+void orderPoints(const Points& points, std::size_t at_most, std::vector<int>& order) {
   order.resize(static_cast<std::size_t>(points.cols()));
   std::iota(order.begin(), order.end(), 0);
   std::sort(order.begin(), order.end(), [&](int a, int b) {
     const float *p = points.col(a).data(), *q = points.col(b).data();
     return std::lexicographical_compare(p, p + 3, q, q + 3);
   });
-  const auto step = static_cast<std::size_t>(stride);
-  const std::size_t kept = (order.size() + step - 1) / step;
-  for (std::size_t i = 0; i < kept; ++i) order[i] = order[i * step];
+  const std::size_t kept = std::min(order.size(), at_most);
+  for (std::size_t i = 0; i < kept; ++i) order[i] = order[i * order.size() / kept];
   order.resize(kept);
 }
 
@@ -71,11 +72,11 @@ void deformationInto(const RigidStep& fit, const Points& start, const Points& re
 struct FlowStage {
   explicit FlowStage(Workspace& workspace) : surroundings(workspace) {}
 
-  /// Reads every so many points of each cloud, in the order of their coordinates.
-  void setClouds(const Points& source, const Points& to, std::int64_t stride,
-                 std::int64_t target_stride) {
-    orderPoints(source, stride, order);
-    orderPoints(to, target_stride, target_order);
+  /// Reads at most so many points of each cloud.
+  void setClouds(const Points& source, const Points& to,
+                 std::size_t at_most = std::numeric_limits<std::size_t>::max()) {
+    orderPoints(source, at_most, order);
+    orderPoints(to, at_most, target_order);
     selectInto(to, target_order, target);
     surroundings.setTarget(target);
     begin(source);
@@ -100,28 +101,25 @@ class FlowModule : public Modules {
   FlowModule(const Weights& weights, Workspace& workspace)
       : workspace_(workspace), weights_(weights) {}
 
-  RigidStep rigidStep(const Points& moved, const Points& target, bool first) override {
+  RigidStep rigidStep(const Points& moved, const Points& target, bool first, bool last) override {
+    if (last) {
+      fine_.setClouds(moved, target);
+      return followed(fine_, kFlowFineSteps);
+    }
     if (first) {
-      rigid_.setClouds(moved, target, flowRigidStride(moved.cols()),
-                       flowRigidStride(target.cols()));
+      coarse_.setClouds(moved, target, kFlowCoarsePoints);
     } else {
-      rigid_.begin(moved);
+      coarse_.begin(moved);
     }
-    for (int i = 0; i < kFlowSteps; ++i) {
-      decode(rigid_, encode(rigid_), rigid_.flow);
-      rigid_.reached += rigid_.flow;
-    }
-    RigidStep step = bestRigidFit(rigid_.start, rigid_.reached);
-    step.last = motion(step) < kFlowConverged;
-    return step;
+    return followed(coarse_, kFlowCoarseSteps);
   }
 
   void displace(const Points& source, const Points& target, const Points& queries,
                 Points& displacements) override {
     const bool of_source = queries.cols() == source.cols() && queries == source;
-    nonrigid_.setClouds(source, target, 1, 1);
+    nonrigid_.setClouds(source, target);
     reached_ = queries;
-    for (int step = 0; step < kFlowSteps; ++step) {
+    for (int step = 0; step < kFlowNonRigidSteps; ++step) {
       const RowsView rows = encode(nonrigid_);
       if (!of_source) {
         deformationInto(nonrigid_.fit, queries, reached_, query_deformation_);
@@ -129,7 +127,7 @@ class FlowModule : public Modules {
                query_flow_);
         reached_ += query_flow_;
       }
-      if (!of_source && step + 1 == kFlowSteps) break;  // no one asks where the source ends
+      if (!of_source && step + 1 == kFlowNonRigidSteps) break;  // no one asks where the source ends
       decode(nonrigid_, rows, nonrigid_.flow);
       nonrigid_.reached += nonrigid_.flow;
     }
@@ -144,13 +142,23 @@ class FlowModule : public Modules {
     }
   }
 
-  const Eigen::VectorXf& rigidFeatures() const override { return rigid_.features; }
+  const Eigen::VectorXf& rigidFeatures() const override { return fine_.features; }
   const Eigen::VectorXf& nonRigidFeatures() const override { return nonrigid_.features; }
 
  private:
-  /// Of the source's points, RMS.
-  float motion(const RigidStep& step) const {
-    const Points& points = rigid_.start;
+  /// The best rigid fit of so many steps along the flow.
+  RigidStep followed(FlowStage& stage, int steps) {
+    for (int i = 0; i < steps; ++i) {
+      decode(stage, encode(stage), stage.flow);
+      stage.reached += stage.flow;
+    }
+    RigidStep step = bestRigidFit(stage.start, stage.reached);
+    step.converged = motion(step, stage.start) < kFlowConverged;
+    return step;
+  }
+
+  /// Of points, RMS.
+  static float motion(const RigidStep& step, const Points& points) {
     const Eigen::Matrix3f turn = step.rotation.toRotationMatrix() - Eigen::Matrix3f::Identity();
     float sum = 0.0F;
     for (Eigen::Index i = 0; i < points.cols(); ++i) {
@@ -198,7 +206,7 @@ class FlowModule : public Modules {
   PointDecoder decoder_{kernels_,       weights_,
                         "flow.decoder", static_cast<int>(kFlowDecoderWidths.size()),
                         kFlowInputs,    2 * kFlowFeatureSize};
-  FlowStage rigid_{workspace_}, nonrigid_{workspace_};
+  FlowStage coarse_{workspace_}, fine_{workspace_}, nonrigid_{workspace_};
   Points reached_, query_deformation_, query_flow_;
   std::vector<float> query_rows_;
 };

@@ -16,8 +16,8 @@ class Modules {
  public:
   virtual ~Modules() = default;
 
-  /// A rigid iteration from where the source has been moved; `first` of these clouds?
-  virtual RigidStep rigidStep(const Points& moved, const Points& target, bool first) = 0;
+  /// A rigid iteration from where the source has been moved; the first of these clouds, the last?
+  virtual RigidStep rigidStep(const Points& moved, const Points& target, bool first, bool last) = 0;
 
   /// Writes the displacements of `queries`, whose size they have, given the rigidly moved source.
   virtual void displace(const Points& source, const Points& target, const Points& queries,

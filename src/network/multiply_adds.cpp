@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "unirit/network/network.hpp"
 
+#include <algorithm>
+
 namespace unirit {
 namespace {
 
@@ -23,12 +25,6 @@ double flowMultiplyAdds(double sources, double targets, bool with_savings) {
          (with_savings ? 1.0 : sources) * kFeatureColumns;
 }
 
-/// Of a cloud, those that the rigid stage of the flow module reads.
-double rigidPoints(Eigen::Index points) {
-  const Eigen::Index stride = flowRigidStride(points);
-  return static_cast<double>((points + stride - 1) / stride);
-}
-
 }  // namespace
 
 double multiplyAdds(Eigen::Index source_points, Eigen::Index target_points, int rigid_iterations,
@@ -36,10 +32,10 @@ double multiplyAdds(Eigen::Index source_points, Eigen::Index target_points, int 
   const auto sources = static_cast<double>(source_points);
   const auto targets = static_cast<double>(target_points);
   if (pairing == Pairing::kOffsets) {
-    return kFlowSteps *
-           (rigid_iterations * flowMultiplyAdds(rigidPoints(source_points),
-                                                rigidPoints(target_points), with_savings) +
-            flowMultiplyAdds(sources, targets, with_savings));
+    const double few = kFlowCoarsePoints;
+    return (rigid_iterations - 1) * kFlowCoarseSteps *
+               flowMultiplyAdds(std::min(sources, few), std::min(targets, few), with_savings) +
+           (kFlowFineSteps + kFlowNonRigidSteps) * flowMultiplyAdds(sources, targets, with_savings);
   }
   const double rigid =
       multiplyAddsPerRow(3, kEncoderWidths) * (rigid_iterations * sources + targets) +

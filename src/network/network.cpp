@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "unirit/network/network.hpp"
 
+#include <algorithm>
 #include <stdexcept>
 #include <string>
 
@@ -70,8 +71,10 @@ Eigen::Isometry3f Network::estimateRigid(const Points& source, const Points& tar
   network.moved = source;
   Eigen::Quaternionf rotation = Eigen::Quaternionf::Identity();
   Eigen::Isometry3f transform = Eigen::Isometry3f::Identity();
-  for (int i = 0; i < network.rigid_iterations; ++i) {
-    const RigidStep step = network.modules->rigidStep(network.moved, target, i == 0);
+  bool first = true;
+  for (int left = network.rigid_iterations; left > 0; first = false) {
+    const RigidStep step = network.modules->rigidStep(network.moved, target, first, left == 1);
+    left = step.converged ? std::min(left - 1, 1) : left - 1;
 
     // Apply the step
     const Eigen::Matrix3f step_rotation = step.rotation.toRotationMatrix();
@@ -87,7 +90,6 @@ Eigen::Isometry3f Network::estimateRigid(const Points& source, const Points& tar
     if (iterates != nullptr) {
       iterates->push_back(transform);
     }
-    if (step.last) break;
   }
   return transform;
 }

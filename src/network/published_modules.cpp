@@ -14,7 +14,8 @@ class PublishedModules : public Modules {
   PublishedModules(const Weights& weights, Workspace& workspace)
       : workspace_(workspace), pairing_(weights.pairing), weights_(weights) {}
 
-  RigidStep rigidStep(const Points& moved, const Points& target, bool first) override {
+  RigidStep rigidStep(const Points& moved, const Points& target, bool first,
+                      bool /*last*/) override {
     float* features = rigid_features_.data();
     rigid_source_.encode(rowsOf(moved), features, workspace_);
     // The target's feature stands still

@@ -12,7 +12,7 @@ namespace unirit {
 struct RigidStep {
   Eigen::Quaternionf rotation;
   Eigen::Vector3f translation;
-  bool last = false;  ///< nothing is left that another would gain
+  bool converged = false;  ///< the next may be the last
 };
 
 /// Reads a step off the features of the moved source and the target.

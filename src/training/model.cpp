@@ -29,14 +29,6 @@ torch::Tensor rotationOf(const torch::Tensor& quaternion) {
   return rows.view({-1, 3, 3});
 }
 
-/// What the rigid stage of the flow module reads of clouds, [B, N, 3].
-torch::Tensor thinned(const torch::Tensor& points) {
-  const std::int64_t stride = flowRigidStride(points.size(1));
-  if (stride == 1) return points;
-  const auto order = points.select(2, 0).argsort(1, false).slice(1, 0, c10::nullopt, stride);
-  return points.gather(1, order.unsqueeze(2).expand({-1, -1, 3}));
-}
-
 }  // namespace
 
 PerceptronImpl::PerceptronImpl(const std::vector<int>& widths, bool linear_end)
@@ -153,6 +145,17 @@ torch::Tensor FlowModuleImpl::forward(const torch::Tensor& start, const torch::T
   return output.slice(2, 0, 3) + (output.slice(2, 3).unsqueeze(3) * vectors).sum(2);
 }
 
+torch::Tensor coarseOrder(const torch::Tensor& points) {
+  const std::int64_t all = points.size(1), kept = std::min<std::int64_t>(all, kFlowCoarsePoints);
+  const auto places =
+      torch::div(torch::arange(kept, points.options().dtype(torch::kLong)) * all, kept, "floor");
+  return points.select(2, 0).argsort(1, false).index_select(1, places);
+}
+
+torch::Tensor ordered(const torch::Tensor& points, const torch::Tensor& order) {
+  return points.gather(1, order.unsqueeze(2).expand({-1, -1, 3}));
+}
+
 UniritImpl::UniritImpl(Pairing pairing) : pairing_(pairing) {
   if (pairing == Pairing::kOffsets) {
     flow = register_module("flow", FlowModule());
@@ -171,29 +174,31 @@ torch::Tensor UniritImpl::moveRigidly(const torch::Tensor& source, const torch::
     }
     return moved;
   }
-  const torch::Tensor some_of_target = thinned(target);
-  torch::Tensor some = thinned(source);
+  const torch::Tensor some_of_target = ordered(target, coarseOrder(target));
+  torch::Tensor some = ordered(source, coarseOrder(source));
   torch::Tensor going_on = torch::ones({source.size(0), 1, 1}, source.options()).to(torch::kBool);
-  for (int i = 0; i < iterations; ++i) {
-    auto deformed = some;
-    for (int k = 0; k < kFlowSteps; ++k) {
-      deformed = deformed + flow->forward(some, deformed, some_of_target);
-    }
-    const Pose step = bestRigidFit(some, deformed);
+  for (int i = 0; i + 1 < iterations; ++i) {
+    const Pose step = bestRigidFit(some, followFlow(some, some_of_target, kFlowCoarseSteps));
     const auto reached = step.apply(some);
     const auto motion = (reached - some).square().sum(2, true).mean(1, true).sqrt();
     moved = torch::where(going_on, step.apply(moved), moved);
     some = torch::where(going_on, reached, some);
     going_on = going_on & (motion >= kFlowConverged);
   }
-  return moved;
+  if (iterations == 0) return moved;
+  return bestRigidFit(moved, followFlow(moved, target, kFlowFineSteps)).apply(moved);
 }
 
 torch::Tensor UniritImpl::deform(const torch::Tensor& moved_source, const torch::Tensor& target) {
-  if (!flow) return moved_source + nonrigid->forward(moved_source, target);
-  torch::Tensor moved = moved_source;
-  for (int i = 0; i < kFlowSteps; ++i) moved = moved + flow->forward(moved_source, moved, target);
-  return moved;
+  if (flow) return followFlow(moved_source, target, kFlowNonRigidSteps);
+  return moved_source + nonrigid->forward(moved_source, target);
+}
+
+torch::Tensor UniritImpl::followFlow(const torch::Tensor& source, const torch::Tensor& target,
+                                     int steps) {
+  torch::Tensor reached = source;
+  for (int i = 0; i < steps; ++i) reached = reached + flow->forward(source, reached, target);
+  return reached;
 }
 
 void UniritImpl::setWeights(const Weights& weights) {

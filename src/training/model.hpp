@@ -96,6 +96,12 @@ class FlowModuleImpl : public torch::nn::Module {
 };
 TORCH_MODULE(FlowModule);
 
+/// Which points of clouds, [B, N, 3], coarse iterations read by flow: [B, K].
+torch::Tensor coarseOrder(const torch::Tensor& points);
+
+/// Those points: [B, K, 3].
+torch::Tensor ordered(const torch::Tensor& points, const torch::Tensor& order);
+
 /// The whole of UniRiT, with the layer names of the weights file.
 class UniritImpl : public torch::nn::Module {
  public:
@@ -105,7 +111,7 @@ class UniritImpl : public torch::nn::Module {
   NonRigidModule nonrigid{nullptr};
   FlowModule flow{nullptr};  ///< with pairing offsets alone
 
-  /// The source after so many iterations of the rigid stage, of the flow module at most.
+  /// The source after so many iterations of the rigid stage, at most, where it goes by flow.
   torch::Tensor moveRigidly(const torch::Tensor& source, const torch::Tensor& target,
                             int iterations);
 
@@ -122,6 +128,9 @@ class UniritImpl : public torch::nn::Module {
   Pairing pairing() const { return pairing_; }
 
  private:
+  /// Where so many steps along the flow take the source.
+  torch::Tensor followFlow(const torch::Tensor& source, const torch::Tensor& target, int steps);
+
   Pairing pairing_;
 };
 TORCH_MODULE(Unirit);

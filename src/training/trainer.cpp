@@ -4,8 +4,8 @@
 #include <chrono>
 #include <cmath>
 #include <fstream>
+#include <future>
 #include <stdexcept>
-#include <thread>
 
 #include "checkpoint.hpp"
 #include "surroundings.hpp"
@@ -14,7 +14,7 @@ namespace unirit::training {
 namespace {
 
 constexpr double kFinalRate = 0.01;       // of the first learning rate
-constexpr double kGrowthShare = 0.3;      // of the steps, over which the iterations grow
+constexpr double kGrowthShare = 0.3;      // of the steps, over which iterations and steps grow
 constexpr double kWarmUpSteps = 200.0;    // the learning rate rises from zero
 constexpr double kLargestGradient = 1.0;  // norm, over a module's parameters
 constexpr int kValidationIterations = 8;
@@ -43,10 +43,11 @@ Batch slice(const Batch& batch, std::int64_t first, std::int64_t last) {
   return transformed(batch, [&](const torch::Tensor& t) { return t.slice(0, first, last); });
 }
 
-/// Rigid iterations: grow from one to all.
-int iterationsAt(const TrainingSettings& settings, std::int64_t step) {
+/// Iterations, or steps along the flow, grow from one to all: weights that have learnt little would
+/// lead far away.
+int grown(int all, const TrainingSettings& settings, std::int64_t step) {
   const double growth = static_cast<double>(step) / (kGrowthShare * settings.steps);
-  return std::min(settings.iterations, 1 + static_cast<int>(growth * settings.iterations));
+  return std::min(all, 1 + static_cast<int>(growth * all));
 }
 
 struct Outcome {
@@ -80,12 +81,13 @@ Outcome pass(Unirit& model, const Batch& batch, const TrainingSettings& settings
 /// inside every operation.
 template <class Work>
 void forEachPart(std::int64_t pairs, std::int64_t parts, const Work& work) {
-  std::vector<std::thread> threads;
+  std::vector<std::future<void>> others;  // hand on what is thrown
   for (std::int64_t part = 1; part < parts; ++part) {
-    threads.emplace_back(work, part, part * pairs / parts, (part + 1) * pairs / parts);
+    others.push_back(std::async(std::launch::async, work, part, part * pairs / parts,
+                                (part + 1) * pairs / parts));
   }
   work(0, 0, pairs / parts);
-  for (std::thread& thread : threads) thread.join();
+  for (std::future<void>& other : others) other.get();
 }
 
 /// Updates a stage's weights by one pass over the batch, moves the batch's source by it and returns
@@ -119,6 +121,35 @@ torch::Tensor update(Unirit& model, torch::optim::Adam& optimiser, Batch& batch,
   return torch::stack(losses).sum();
 }
 
+/// So many updates, each on the output of the one before, and the mean of their losses.
+torch::Tensor updates(int passes, Unirit& model, torch::optim::Adam& optimiser, Batch& batch,
+                      const TrainingSettings& settings, Stage stage) {
+  torch::Tensor loss = torch::zeros({}, batch.source.options());
+  for (int i = 0; i < passes; ++i) loss += update(model, optimiser, batch, settings, stage);
+  return loss / passes;
+}
+
+/// The iterations of the rigid stage by flow: all but the last are coarse.
+torch::Tensor learnRigidFlow(Unirit& model, torch::optim::Adam& optimiser, Batch& batch,
+                             const TrainingSettings& settings, std::int64_t step) {
+  torch::Tensor loss = torch::zeros({}, batch.source.options());
+  const int iterations = grown(settings.iterations, settings, step);
+  const auto source = coarseOrder(batch.source), target = coarseOrder(batch.target);
+  for (int i = 0; i < iterations; ++i) {
+    const bool fine = i + 1 == iterations;
+    Batch read = batch;
+    if (!fine) {
+      read.source = read.start = ordered(batch.source, source);
+      read.target = ordered(batch.target, target);
+      read.truth = ordered(batch.truth, source);
+    }
+    const int steps = grown(fine ? kFlowFineSteps : kFlowCoarseSteps, settings, step);
+    loss += updates(steps, model, optimiser, read, settings, Stage::kRigid);
+    batch.source = batch.start = bestRigidFit(read.start, read.source).apply(batch.start);
+  }
+  return loss / iterations;
+}
+
 /// One step: an update for every iteration of the rigid stage, by flow for every step of it, each
 /// on the output of the one before, so that it has seen what it will be given, then those of the
 /// non-rigid stage. What passes between them is detached and Adam does not see a loss's scale, so
@@ -127,17 +158,16 @@ torch::Tensor learn(Unirit& model, torch::optim::Adam& optimiser, Batch batch,
                     const TrainingSettings& settings, std::int64_t step) {
   const double alpha = step < settings.rigid_steps ? 0.0 : settings.alpha;
   torch::Tensor loss = torch::zeros({}, batch.source.options());
-  const auto add = [&](Stage stage, int passes, double weight) {
-    for (int i = 0; i < passes; ++i) {
-      loss += weight / passes * update(model, optimiser, batch, settings, stage);
-      if (model->flow && stage == Stage::kRigid && (i + 1) % kFlowSteps == 0) {
-        batch.source = batch.start = bestRigidFit(batch.start, batch.source).apply(batch.start);
-      }
-    }
-  };
-  const int steps = model->flow ? kFlowSteps : 1;
-  if (alpha < 1.0) add(Stage::kRigid, steps * iterationsAt(settings, step), 1.0 - alpha);
-  if (alpha > 0.0) add(Stage::kNonRigid, steps, alpha);
+  if (alpha < 1.0) {
+    loss += (1.0 - alpha) *
+            (model->flow ? learnRigidFlow(model, optimiser, batch, settings, step)
+                         : updates(grown(settings.iterations, settings, step), model, optimiser,
+                                   batch, settings, Stage::kRigid));
+  }
+  if (alpha > 0.0) {
+    const int steps = model->flow ? grown(kFlowNonRigidSteps, settings, step) : 1;
+    loss += alpha * updates(steps, model, optimiser, batch, settings, Stage::kNonRigid);
+  }
   return loss;
 }
 

@@ -169,9 +169,9 @@ TEST(NetworkContract, theRigidStageOfTheFlowReadsFewerPoints) {
   const auto cost = [](int iterations, bool with_savings) {
     return multiplyAdds(1024, 1024, iterations, Pairing::kOffsets, with_savings);
   };
-  const double rigid = 512 * (encoders + decoder), nonrigid = 2 * rigid;
-  EXPECT_EQ(cost(8, true), 3 * (8 * (rigid + global) + nonrigid + global));
-  EXPECT_EQ(cost(3, false), 3 * (3 * (rigid + 512 * global) + nonrigid + 1024 * global));
+  const double point = encoders + decoder;
+  EXPECT_EQ(cost(8, true), 7 * 3 * (320 * point + global) + 12 * (1024 * point + global));
+  EXPECT_EQ(cost(3, false), (2 * 3 * 320 + 12 * 1024) * (point + global));
 }
 
 TEST(Normalisation, putsTheSourceIntoTheUnitCube) {

@@ -40,20 +40,16 @@ inline constexpr int kFlowInputs = kFlowFirstVector + 4 * kFlowVectors;
 inline constexpr int kFlowTargetInputs = 6;
 /// A displacement, and how much of each vector is added to it.
 inline constexpr std::array<int, 4> kFlowDecoderWidths{128, 128, 128, 3 + kFlowVectors};
-/// Points of each cloud, at most, that the rigid stage reads: evenly chosen ones of more, every so
-/// many in the order of their coordinates.
-inline constexpr int kFlowRigidPoints = 512;
-
-/// Every how manieth of so many points the rigid stage reads.
-constexpr std::int64_t flowRigidStride(std::int64_t points) {
-  return (points + kFlowRigidPoints - 1) / kFlowRigidPoints;
-}
-
-/// Iterations of the rigid stage end after one that moves these points by less than this, RMS [half
-/// extents]: those that followed would drift.
+/// All iterations of the rigid stage but the last are coarse: they read at most so many points of
+/// each cloud, evenly chosen in the order of their coordinates, and follow the flow for few steps.
+inline constexpr int kFlowCoarsePoints = 320;
+inline constexpr int kFlowCoarseSteps = 3;
+/// The last is fine: it reads all points and follows the flow for longer. It comes after one that
+/// moves the points by less than this, RMS [half extents]: more coarse ones would drift.
 inline constexpr float kFlowConverged = 0.015F;
-/// Steps along the flow: of each iteration of the rigid stage, and of the non-rigid stage.
-inline constexpr int kFlowSteps = 3;
+inline constexpr int kFlowFineSteps = 6;
+/// Of the non-rigid stage.
+inline constexpr int kFlowNonRigidSteps = 6;
 
 /// Inputs of the non-rigid decoder: point (3), two global features (2048), paired row (3 or none).
 constexpr int nonRigidDecoderInputs(Pairing pairing) {
