@@ -31,7 +31,7 @@ FLOW_SCALES = [0.8, 0.4, 0.2, 0.1]
 FLOW_INPUTS, FLOW_TARGET_INPUTS = 79, 6
 FLOW_DECODER = [FLOW_INPUTS + 512, 128, 128, 128, 21]
 FLOW_COARSE_POINTS, FLOW_COARSE_STEPS, FLOW_FINE_STEPS = 320, 3, 6
-PARAMETERS = {"nearest": 7466122, "offsets": 216405}
+PARAMETERS = {"nearest": 7466122, "offsets": 217333}
 PHASES = {"rigid": ("nearest", 0.0), "both": ("nearest", 0.5),
           "flow": ("offsets", 0.5)}  # pairing and weight of the global loss
 

@@ -39,7 +39,7 @@ inline constexpr long kPointBlock = 16;
 
 /// Neighbourhoods of a point, each half the size of the one before, and what is averaged over them.
 inline constexpr int kNeighbourhoods = 4;
-inline constexpr int kAveraged = 20;
+inline constexpr int kAveraged = 23;
 
 /// What normals do to the attraction between two points.
 enum class NormalUse {

@@ -24,7 +24,10 @@ constexpr Eigen::Index kOne = 7;
 constexpr Eigen::Index kDeformation = 8;
 constexpr Eigen::Index kToPlane = 11;  // the part of the first along the normal there
 constexpr Eigen::Index kPlane = 14;    // that normal times its transpose
-static_assert(kPlane + 6 == kAveraged);
+constexpr Eigen::Index kWay = 20;      // what is added to the coherent way, summed
+static_assert(kWay + 3 == kAveraged);
+constexpr int kWayScale = 1;
+static_assert(kFlowScales[kWayScale] == kFlowLength);
 
 /// Of a symmetric matrix.
 using Triangle = Eigen::Matrix<float, 6, 1>;
@@ -100,6 +103,27 @@ void Surroundings::setSource(const Points& source, const Points& deformation) {
     values_.col(nearest).segment<3>(kFromBack) -= back;
     values_(kBackCount, nearest) += 1.0F;
   }
+  fitCoherentWay();
+}
+
+void Surroundings::fitCoherentWay() {
+  const Eigen::Index all = target_.cols(), count = std::min<Eigen::Index>(all, kFlowPlanes);
+  plane_points_.resize(3, count);
+  plane_offsets_.resize(3, count);
+  plane_normals_.resize(3, count);
+  const auto chosen = [&](Eigen::Index k) { return k * all / count; };
+  const auto nearest = [&](Eigen::Index k) {
+    return nearest_source_[static_cast<std::size_t>(chosen(k))];
+  };
+  for (Eigen::Index k = 0; k < count; ++k) {
+    plane_points_.col(k) = source_.col(nearest(k));
+    plane_offsets_.col(k) = target_.col(chosen(k)) - plane_points_.col(k);
+    plane_normals_.col(k) = target_normals_.col(chosen(k));
+  }
+  way_.fit(plane_points_, plane_offsets_, plane_normals_);
+  for (Eigen::Index k = 0; k < count; ++k) {
+    values_.col(nearest(k)).segment<3>(kWay) += way_.sources().col(k);
+  }
 }
 
 RowsView Surroundings::ofTarget() const {
@@ -146,7 +170,8 @@ void Surroundings::read(const Points& queries, const Points& deformation, long b
           sums + kAveraged * (kNeighbourhoods * q + scale));
       const float weight = std::max(sum[kOne], std::numeric_limits<float>::min());
       shares[scale] = ratio * sum[kBackCount] / weight;
-      auto means = vectors.middleCols<4>(2 + 4 * scale);
+      if (scale == kWayScale) vectors.col(2) = way_.rigid(query) + sum.segment<3>(kWay);
+      auto means = vectors.middleCols<4>(3 + 4 * scale);
       means.col(0) = sum.segment<3>(kToTarget) / weight;
       means.col(1) = sum.segment<3>(kFromBack) / (sum[kBackCount] + kFlowFewest);
       means.col(2) = sum.segment<3>(kDeformation) / weight;

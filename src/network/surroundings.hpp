@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "coherent_way.hpp"
 #include "unirit/point_cloud.hpp"
 #include "workspace.hpp"
 
@@ -35,8 +36,12 @@ class Surroundings {
             const int* nearest, float* rows) const;
 
   Workspace& workspace_;
+  void fitCoherentWay();
+
   Points source_, deformation_, target_, target_normals_;
-  std::vector<int> nearest_target_, nearest_source_;  // of each source, of each target point
+  CoherentWay way_;
+  Points plane_points_, plane_offsets_, plane_normals_;  // of some of the target's points
+  std::vector<int> nearest_target_, nearest_source_;     // of each source, of each target point
   Eigen::Matrix<float, kFlowTargetInputs, Eigen::Dynamic> of_target_;
   Eigen::Matrix<float, kAveraged, Eigen::Dynamic> values_, target_values_;  // to be averaged
 };

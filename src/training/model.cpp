@@ -29,6 +29,11 @@ torch::Tensor rotationOf(const torch::Tensor& quaternion) {
   return rows.view({-1, 3, 3});
 }
 
+/// In the order of the first coordinates.
+torch::Tensor sorted(const torch::Tensor& points) {
+  return ordered(points, points.select(2, 0).argsort(1, false));
+}
+
 }  // namespace
 
 PerceptronImpl::PerceptronImpl(const std::vector<int>& widths, bool linear_end)
@@ -186,11 +191,11 @@ torch::Tensor UniritImpl::moveRigidly(const torch::Tensor& source, const torch::
     going_on = going_on & (motion >= kFlowConverged);
   }
   if (iterations == 0) return moved;
-  return bestRigidFit(moved, followFlow(moved, target, kFlowFineSteps)).apply(moved);
+  return bestRigidFit(moved, followFlow(moved, sorted(target), kFlowFineSteps)).apply(moved);
 }
 
 torch::Tensor UniritImpl::deform(const torch::Tensor& moved_source, const torch::Tensor& target) {
-  if (flow) return followFlow(moved_source, target, kFlowNonRigidSteps);
+  if (flow) return followFlow(moved_source, sorted(target), kFlowNonRigidSteps);
   return moved_source + nonrigid->forward(moved_source, target);
 }
 

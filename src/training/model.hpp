@@ -96,7 +96,8 @@ class FlowModuleImpl : public torch::nn::Module {
 };
 TORCH_MODULE(FlowModule);
 
-/// Which points of clouds, [B, N, 3], coarse iterations read by flow: [B, K].
+/// Which points of clouds, [B, N, 3], coarse iterations read by flow, in the order of their first
+/// coordinates: [B, K].
 torch::Tensor coarseOrder(const torch::Tensor& points);
 
 /// Those points: [B, K, 3].

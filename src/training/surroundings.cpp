@@ -47,6 +47,34 @@ torch::Tensor normalsOf(const torch::Tensor& points) {
   return std::get<1>(torch::linalg_eigh(covariance, "L")).select(3, 0);
 }
 
+/// As unirit::CoherentWay: the vectors, [B, N, 3], that take `source` to the planes through some of
+/// the target's points, which have these normals and nearest points of the source.
+torch::Tensor coherentWay(const torch::Tensor& source, const torch::Tensor& target,
+                          const torch::Tensor& normals, const torch::Tensor& nearest) {
+  const std::int64_t all = target.size(1), count = std::min<std::int64_t>(all, kFlowPlanes);
+  const auto chosen = torch::div(torch::arange(count, nearest.options()) * all, count, "floor");
+  const auto normal = normals.index_select(1, chosen);
+  const auto point = source.gather(1, ofPoints(nearest.index_select(1, chosen)));
+  const auto offset = target.index_select(1, chosen) - point;
+  const auto closeness = [&](const torch::Tensor& points) {
+    return torch::cdist(points, point).square_().mul_(-0.5 / (kFlowLength * kFlowLength)).exp_();
+  };
+  const double amplitude = kFlowAmplitude * kFlowAmplitude,
+               rigid = kFlowRigidAmplitude * kFlowRigidAmplitude,
+               noise = kFlowPlaneNoise * kFlowPlaneNoise, reach = kFlowPlaneReach * kFlowPlaneReach;
+  const auto wrench = torch::cat({normal, torch::cross(point, normal, 2)}, 2);
+  auto covariance = amplitude * closeness(point) * torch::bmm(normal, normal.transpose(1, 2)) +
+                    rigid * torch::bmm(wrench, wrench.transpose(1, 2));
+  const auto diagonal = covariance.diagonal(0, 1, 2);
+  diagonal.mul_(1.0 + kFlowPlaneRounding).add_(noise * (1.0 + offset.square().sum(2) / reach));
+  const auto gains =
+      torch::cholesky_solve((normal * offset).sum(2, true), torch::linalg_cholesky(covariance));
+  const auto motion = rigid * torch::bmm(wrench.transpose(1, 2), gains).transpose(1, 2);
+  const auto turn = motion.slice(2, 3, 6).expand_as(source);
+  return motion.slice(2, 0, 3) + torch::cross(turn, source, 2) +
+         torch::bmm(closeness(source), amplitude * gains * normal);
+}
+
 }  // namespace
 
 torch::Tensor offsets(const torch::Tensor& from, const torch::Tensor& to) {
@@ -75,7 +103,8 @@ Surroundings onAnyDevice(const torch::Tensor& source, const torch::Tensor& defor
   const auto nearest = distances.argmin(1);  // of the source
   const auto to_source = source.gather(1, ofPoints(nearest)) - target;
 
-  const auto normals = normalsOf(target).gather(1, ofPoints(distances.argmin(2)));
+  const auto target_normals = normalsOf(target);
+  const auto normals = target_normals.gather(1, ofPoints(distances.argmin(2)));
   const auto to_plane = normals * (normals * to_target).sum(2, true);
   const auto planes = (normals.unsqueeze(3) * normals.unsqueeze(2)).flatten(2);
 
@@ -88,7 +117,9 @@ Surroundings onAnyDevice(const torch::Tensor& source, const torch::Tensor& defor
       {to_target, sum, count, torch::ones_like(count), deformation, to_plane, planes}, 2);
 
   const double ratio = static_cast<double>(source.size(1)) / static_cast<double>(target.size(1));
-  std::vector<torch::Tensor> vectors{to_target, deformation}, inputs{source};
+  std::vector<torch::Tensor> inputs{source};
+  std::vector<torch::Tensor> vectors{to_target, deformation,
+                                     coherentWay(source, target, target_normals, nearest)};
   const auto squares = torch::cdist(source, source).square_();
   auto kernel = squares.mul_(-0.5 / (kFlowScales[0] * kFlowScales[0])).exp_();
   for (std::size_t scale = 0; scale < kFlowScales.size(); ++scale) {

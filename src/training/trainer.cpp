@@ -17,6 +17,7 @@ constexpr double kFinalRate = 0.01;       // of the first learning rate
 constexpr double kGrowthShare = 0.3;      // of the steps, over which iterations and steps grow
 constexpr double kWarmUpSteps = 200.0;    // the learning rate rises from zero
 constexpr double kLargestGradient = 1.0;  // norm, over a module's parameters
+constexpr double kAstray = 2.0;           // RMS from the truth from which a pair starts again
 constexpr int kValidationIterations = 8;
 constexpr std::int64_t kValidationPairs = 2;  // an organ
 constexpr std::int64_t kValidationPoints = 1024;
@@ -108,7 +109,11 @@ torch::Tensor update(Unirit& model, torch::optim::Adam& optimiser, Batch& batch,
     moved[slot] = outcome.moved;
     gradients[slot] = torch::autograd::grad({loss}, parameters, {}, {}, false, true);
   });
-  if (moved.front().defined()) batch.source = torch::cat(moved);
+  if (moved.front().defined()) {
+    const auto reached = torch::cat(moved);
+    const auto distance_left = (reached - batch.truth).square().sum(2, true).mean(1, true).sqrt();
+    batch.source = torch::where(distance_left < kAstray, reached, batch.start);
+  }
 
   for (std::size_t i = 0; i < parameters.size(); ++i) {
     auto& sum = parameters[i].mutable_grad();
@@ -159,10 +164,10 @@ torch::Tensor learn(Unirit& model, torch::optim::Adam& optimiser, Batch batch,
   const double alpha = step < settings.rigid_steps ? 0.0 : settings.alpha;
   torch::Tensor loss = torch::zeros({}, batch.source.options());
   if (alpha < 1.0) {
-    loss += (1.0 - alpha) *
-            (model->flow ? learnRigidFlow(model, optimiser, batch, settings, step)
-                         : updates(grown(settings.iterations, settings, step), model, optimiser,
-                                   batch, settings, Stage::kRigid));
+    loss +=
+        (1.0 - alpha) * (model->flow ? learnRigidFlow(model, optimiser, batch, settings, step)
+                                     : updates(grown(settings.iterations, settings, step), model,
+                                               optimiser, batch, settings, Stage::kRigid));
   }
   if (alpha > 0.0) {
     const int steps = model->flow ? grown(kFlowNonRigidSteps, settings, step) : 1;

@@ -43,6 +43,51 @@ inline Eigen::Matrix3Xd normals(const Eigen::Matrix3Xd& points) {
   return normals;
 }
 
+/// Of the motion of two points, rigid and smoothly deforming.
+inline Eigen::Matrix3d covariance(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+  const auto turned = [](const Eigen::Vector3d& p) {
+    return (Eigen::Matrix3d() << 0, p[2], -p[1], -p[2], 0, p[0], p[1], -p[0], 0).finished();
+  };
+  const double deforming = std::pow(kFlowAmplitude, 2) *
+                           std::exp(-0.5 * (a - b).squaredNorm() / std::pow(kFlowLength, 2));
+  return deforming * Eigen::Matrix3d::Identity() +
+         std::pow(kFlowRigidAmplitude, 2) *
+             (Eigen::Matrix3d::Identity() + turned(a) * turned(b).transpose());
+}
+
+/// The posterior mean of the motion of `queries`, given what takes some points to planes.
+inline Eigen::Matrix3Xd coherentWay(const Eigen::Matrix3Xd& source, const Eigen::Matrix3Xd& target,
+                                    const Eigen::Matrix3Xd& queries) {
+  const Eigen::Index count = std::min<Eigen::Index>(target.cols(), kFlowPlanes);
+  const Eigen::Matrix3Xd target_normals = normals(target);
+  Eigen::Matrix3Xd points(3, count), planes(3, count);
+  Eigen::VectorXd ways(count), noise(count);
+  for (Eigen::Index k = 0; k < count; ++k) {
+    const Eigen::Index j = k * target.cols() / count;
+    points.col(k) = source.col(nearest(target.col(j), source));
+    planes.col(k) = target_normals.col(j);
+    const Eigen::Vector3d offset = target.col(j) - points.col(k);
+    ways[k] = planes.col(k).dot(offset);
+    noise[k] =
+        std::pow(kFlowPlaneNoise, 2) * (1.0 + offset.squaredNorm() / std::pow(kFlowPlaneReach, 2));
+  }
+  Eigen::MatrixXd of_ways = noise.asDiagonal();
+  for (Eigen::Index a = 0; a < count; ++a) {
+    for (Eigen::Index b = 0; b < count; ++b) {
+      of_ways(a, b) += planes.col(a).dot(covariance(points.col(a), points.col(b)) * planes.col(b));
+    }
+  }
+  of_ways.diagonal() += kFlowPlaneRounding * (of_ways.diagonal() - noise);
+  const Eigen::VectorXd gains = of_ways.ldlt().solve(ways);
+  Eigen::Matrix3Xd motion = Eigen::Matrix3Xd::Zero(3, queries.cols());
+  for (Eigen::Index q = 0; q < queries.cols(); ++q) {
+    for (Eigen::Index k = 0; k < count; ++k) {
+      motion.col(q) += covariance(queries.col(q), points.col(k)) * planes.col(k) * gains[k];
+    }
+  }
+  return motion;
+}
+
 /// What the flow module reads of each of `queries`, among the source's points.
 inline Eigen::MatrixXd surroundings(const MovingCloud& moving_source,
                                     const Eigen::Matrix3Xd& target,
@@ -56,11 +101,12 @@ inline Eigen::MatrixXd surroundings(const MovingCloud& moving_source,
   for (Eigen::Index i = 0; i < source.cols(); ++i) {
     source_normals.col(i) = target_normals.col(nearest(source.col(i), target));
   }
+  const Eigen::Matrix3Xd way = coherentWay(source, target, queries);
   const double ratio = static_cast<double>(source.cols()) / static_cast<double>(target.cols());
   Eigen::MatrixXd inputs(kFlowInputs, queries.cols());
   for (Eigen::Index q = 0; q < queries.cols(); ++q) {
     const Eigen::Vector3d query = queries.col(q);
-    std::vector<Eigen::Vector3d> vectors{offsets(query, target), of_queries.col(q)};
+    std::vector<Eigen::Vector3d> vectors{offsets(query, target), of_queries.col(q), way.col(q)};
     std::vector<double> shares;
     for (const double scale : kFlowScales) {
       const auto weightAt = [&](const Eigen::Vector3d& point) {
@@ -130,8 +176,8 @@ inline void followFlow(const Weights& weights, int steps, MovingCloud& source,
   }
 }
 
-/// What coarse iterations read of a cloud.
-inline Points thinned(const Points& points) {
+/// At most so many points of a cloud, evenly chosen in the order of their coordinates.
+inline Points evenly(const Points& points, Eigen::Index at_most) {
   std::vector<Eigen::Vector3f> sorted(static_cast<std::size_t>(points.cols()));
   for (std::size_t i = 0; i < sorted.size(); ++i) {
     sorted[i] = points.col(static_cast<Eigen::Index>(i));
@@ -139,7 +185,7 @@ inline Points thinned(const Points& points) {
   std::sort(sorted.begin(), sorted.end(), [](const auto& a, const auto& b) {
     return std::tie(a[0], a[1], a[2]) < std::tie(b[0], b[1], b[2]);
   });
-  Points kept(3, std::min<Eigen::Index>(points.cols(), kFlowCoarsePoints));
+  Points kept(3, std::min(points.cols(), at_most));
   for (Eigen::Index i = 0; i < kept.cols(); ++i) {
     kept.col(i) = sorted[static_cast<std::size_t>(i * points.cols() / kept.cols())];
   }

@@ -24,10 +24,12 @@ inline std::vector<Eigen::Isometry3d> estimateRigid(const Weights& weights,
   Eigen::Isometry3d transform = Eigen::Isometry3d::Identity();
   for (int left = iterations; left > 0;) {
     const bool coarse = by_flow && left > 1;
-    const Points source = coarse ? thinned(source_points) : source_points;
-    const Points read_of_target = coarse ? thinned(target_points) : target_points;
-    const Eigen::Matrix3Xd target = read_of_target.cast<double>();
-    const Eigen::Matrix3Xd moved = transform * source.cast<double>();
+    const auto read = [&](const Points& points) -> Eigen::Matrix3Xd {
+      if (!by_flow) return points.cast<double>();
+      return evenly(points, coarse ? kFlowCoarsePoints : points.cols()).cast<double>();
+    };
+    const Eigen::Matrix3Xd source = read(source_points), target = read(target_points);
+    const Eigen::Matrix3Xd moved = transform * source;
     Eigen::Isometry3d step;
     if (by_flow) {
       MovingCloud cloud(moved), none(Eigen::Matrix3Xd(3, 0));
@@ -56,7 +58,8 @@ inline Eigen::Matrix3Xd estimateDisplacements(const Weights& weights, const Poin
   const Eigen::Matrix3Xd target = target_points.cast<double>();
   if (weights.pairing == Pairing::kOffsets) {
     MovingCloud cloud(source), moving_queries(queries);
-    followFlow(weights, kFlowNonRigidSteps, cloud, target, moving_queries);
+    const Points sorted = evenly(target_points, target_points.cols());
+    followFlow(weights, kFlowNonRigidSteps, cloud, sorted.cast<double>(), moving_queries);
     return moving_queries.reached - queries;
   }
   const Eigen::VectorXd both = features(weights, "nonrigid", source, target);

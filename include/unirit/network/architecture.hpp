@@ -32,7 +32,18 @@ inline constexpr std::array<float, 4> kFlowScales{0.8F, 0.4F, 0.2F, 0.1F};  ///<
 inline constexpr float kFlowFewest = 0.01F;
 /// Weight of staying where one is, beside the target's planes, in the way to them.
 inline constexpr float kFlowPlaneRidge = 0.05F;
-inline constexpr int kFlowVectors = 2 + 4 * static_cast<int>(kFlowScales.size());
+/// The coherent way to the target's planes (see coherent_way.hpp): of how many of the target's
+/// points, the deformation's length and amplitude, the rigid motion's, the noise of a plane, the
+/// offset at which its variance doubles [half extents].
+inline constexpr int kFlowPlanes = 256;
+inline constexpr float kFlowLength = kFlowScales[1];
+inline constexpr float kFlowAmplitude = 0.15F;
+inline constexpr float kFlowRigidAmplitude = 0.5F;
+inline constexpr float kFlowPlaneNoise = 0.08F;
+inline constexpr float kFlowPlaneReach = 0.1F;
+/// Share of its own variance that is taken for noise, too, against rounding where clouds are large.
+inline constexpr float kFlowPlaneRounding = 1e-4F;
+inline constexpr int kFlowVectors = 3 + 4 * static_cast<int>(kFlowScales.size());
 /// Point (3), for each scale the share of the target found there, the vectors, their lengths.
 inline constexpr int kFlowFirstVector = 3 + static_cast<int>(kFlowScales.size());
 inline constexpr int kFlowInputs = kFlowFirstVector + 4 * kFlowVectors;
@@ -49,7 +60,7 @@ inline constexpr int kFlowCoarseSteps = 3;
 inline constexpr float kFlowConverged = 0.015F;
 inline constexpr int kFlowFineSteps = 6;
 /// Of the non-rigid stage.
-inline constexpr int kFlowNonRigidSteps = 6;
+inline constexpr int kFlowNonRigidSteps = 3;
 
 /// Inputs of the non-rigid decoder: point (3), two global features (2048), paired row (3 or none).
 constexpr int nonRigidDecoderInputs(Pairing pairing) {
