@@ -28,10 +28,11 @@ NONRIGID_DECODER = [2054, 1024, 512, 256, 128, 64, 3]
 DECODED_POINTS = 64
 FLOW_ENCODER = [64, 64, 64, 128, 256]
 FLOW_SCALES = [0.8, 0.4, 0.2, 0.1]
-FLOW_INPUTS, FLOW_TARGET_INPUTS = 79, 6
-FLOW_DECODER = [FLOW_INPUTS + 512, 128, 128, 128, 21]
+FLOW_INPUTS, FLOW_TARGET_INPUTS = 83, 6
+FLOW_DECODER = [FLOW_INPUTS + 512, 128, 128, 128, 22]
+FLOW_PLANES, FLOW_LENGTH = 256, 0.4
 FLOW_COARSE_POINTS, FLOW_COARSE_STEPS, FLOW_FINE_STEPS = 320, 3, 6
-PARAMETERS = {"nearest": 7466122, "offsets": 217333}
+PARAMETERS = {"nearest": 7466122, "offsets": 217302}
 PHASES = {"rigid": ("nearest", 0.0), "both": ("nearest", 0.5),
           "flow": ("offsets", 0.5)}  # pairing and weight of the global loss
 
@@ -173,11 +174,33 @@ def train_with_torch(options):
         covariance = squares.unflatten(2, (3, 3)) - mean.unsqueeze(3) * mean.unsqueeze(2)
         return torch.linalg.eigh(covariance)[1][:, :, :, 0]
 
+    def coherent_way(source, target, normals, nearest):
+        count = min(FLOW_PLANES, target.shape[1])
+        chosen = torch.arange(count) * target.shape[1] // count
+        normal = normals[:, chosen]
+        point = source.gather(1, of_points(nearest[:, chosen]))
+        offset = target[:, chosen] - point
+        wrench = torch.cat([normal, torch.cross(point, normal, dim=2)], 2)
+
+        def closeness(points):
+            return (torch.cdist(points, point).square() * (-0.5 / FLOW_LENGTH ** 2)).exp()
+
+        covariance = 0.0225 * closeness(point) * (normal @ normal.transpose(1, 2))
+        covariance += 0.25 * wrench @ wrench.transpose(1, 2)
+        covariance.diagonal(0, 1, 2).mul_(1.0001).add_(
+            0.0064 * (1.0 + offset.square().sum(2) / 0.01))
+        gains = torch.cholesky_solve((normal * offset).sum(2, True),
+                                     torch.linalg.cholesky(covariance))
+        motion = 0.25 * (wrench.transpose(1, 2) @ gains).transpose(1, 2)
+        turned = torch.cross(motion[:, :, 3:].expand_as(source), source, dim=2)
+        return motion[:, :, :3] + turned + closeness(source) @ (0.0225 * gains * normal)
+
     def surroundings(source, deformation, target):
         distances = torch.cdist(source, target)
         of_source = of_points(distances.argmin(2))
         to_target = target.gather(1, of_source) - source
-        normals = normals_of(target).gather(1, of_source)
+        target_normals = normals_of(target)
+        normals = target_normals.gather(1, of_source)
         to_plane = normals * (normals * to_target).sum(2, True)
         planes = (normals.unsqueeze(3) * normals.unsqueeze(2)).flatten(2)
         nearest = distances.argmin(1)
@@ -189,7 +212,8 @@ def train_with_torch(options):
                             planes], 2)
         squares = torch.cdist(source, source).square()
         kernel = (squares * (-0.5 / FLOW_SCALES[0] ** 2)).exp()
-        vectors, inputs = [to_target, deformation], [source]
+        way = coherent_way(source, target, target_normals, nearest)
+        vectors, inputs = [to_target, deformation, way], [source]
         for scale in FLOW_SCALES:
             if scale < FLOW_SCALES[0]:
                 kernel = kernel.square().square()

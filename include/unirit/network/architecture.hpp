@@ -23,8 +23,9 @@ inline constexpr int kFeatureSize = 1024;
 /// of the rigid stage is the best rigid fit of a few such steps. Beside a point the module reads
 /// where the clouds lie to each other about it: vectors to the nearest point of the other cloud,
 /// either way, over neighbourhoods of several sizes, and the shortest way to the planes on which
-/// the target's points lie there; and how the steps so far have deformed the source, which is what
-/// their best rigid fit leaves of them.
+/// the target's points lie there; where a coherent motion of the whole takes it that brings the
+/// source to those planes; and how the steps so far have deformed the source, which is what their
+/// best rigid fit leaves of them.
 inline constexpr std::array<int, 5> kFlowEncoderWidths{64, 64, 64, 128, 256};
 inline constexpr int kFlowFeatureSize = kFlowEncoderWidths.back();
 inline constexpr std::array<float, 4> kFlowScales{0.8F, 0.4F, 0.2F, 0.1F};  ///< half extents
