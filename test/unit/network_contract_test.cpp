@@ -113,7 +113,8 @@ TEST(NetworkContract, aFlowThatOverflowsIsAnErrorNotADisplacement) {
 
 TEST(NetworkContract, theRotationStaysARotation) {
   for (const Pairing pairing : {Pairing::kNearest, Pairing::kOffsets}) {
-    Network network(loudWeights(pairing), {32, pairing}, 1);
+    const int iterations = pairing == Pairing::kOffsets ? 4 : 32;
+    Network network(loudWeights(pairing), {iterations, pairing}, 1);
     const Eigen::Matrix3f rotation =
         network.estimateRigid(randomPoints(30, 1), randomPoints(30, 2)).linear();
     EXPECT_LT((rotation * rotation.transpose() - Eigen::Matrix3f::Identity()).norm(), 1e-6F);
