@@ -15,6 +15,6 @@ organs=$(realpath "$1") output=$(realpath -m "$2") device=${3:-cpu}
 source "$(dirname "${BASH_SOURCE[0]}")/setup.sh"
 
 exec "$root/build/devel/lib/unirit/unirit_train" --data "$organs" --phantoms 6 --hold-out 24 \
-  --output "$output" --device "$device" --steps 1700 --batch 32 --points 512 --iterations 5 \
-  --partial-share 0.55 --near-share 0.35 --pairs-per-deformation 8 --learning-rate 5e-4 --seed 2 \
-  --report-every 100 --save-every 50
+  --output "$output" --device "$device" --steps 1400 --batch 32 --points 512 --iterations 6 \
+  --partial-share 0.65 --near-share 0.35 --pairs-per-deformation 8 --learning-rate 5e-4 --seed 2 \
+  --report-every 50 --save-every 50

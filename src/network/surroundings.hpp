@@ -34,10 +34,9 @@ class Surroundings {
  private:
   void read(const Points& queries, const Points& deformation, long begin, long count,
             const int* nearest, float* rows) const;
-
-  Workspace& workspace_;
   void fitCoherentWay();
 
+  Workspace& workspace_;
   Points source_, deformation_, target_, target_normals_;
   CoherentWay way_;
   Points plane_points_, plane_offsets_, plane_normals_;  // of some of the target's points

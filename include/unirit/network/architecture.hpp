@@ -58,7 +58,7 @@ inline constexpr int kFlowCoarsePoints = 320;
 inline constexpr int kFlowCoarseSteps = 3;
 /// The last is fine: it reads all points and follows the flow for longer. It comes after one that
 /// moves the points by less than this, RMS [half extents]: more coarse ones would drift.
-inline constexpr float kFlowConverged = 0.015F;
+inline constexpr float kFlowConverged = 0.08F;
 inline constexpr int kFlowFineSteps = 6;
 /// Of the non-rigid stage.
 inline constexpr int kFlowNonRigidSteps = 3;
