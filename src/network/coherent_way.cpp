@@ -17,7 +17,8 @@ void CoherentWay::fit(const Points& points, const Points& offsets, const Points&
   gains_.resize(count);
   for (Eigen::Index j = 0; j < count; ++j) {
     const Eigen::Vector3f point = points.col(j), normal = normals.col(j);
-    wrenches_.col(j) << normal, point.cross(normal);
+    wrenches_.col(j).head<3>() = normal;
+    wrenches_.col(j).tail<3>() = point.cross(normal);
     gains_[j] = normal.dot(offsets.col(j));
   }
 

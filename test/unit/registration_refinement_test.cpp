@@ -94,7 +94,7 @@ TEST(RegistrationStages, AnUntrainedNetworkDoesNoHarmBeforeTheRefinement) {
         registered(organ(pair), seen(pair), {Stage::kRigid, Stage::kNonRigid});
     const Registration whole =
         registered(organ(pair), seen(pair), {Stage::kRigid, Stage::kNonRigid, Stage::kRefine});
-    EXPECT_GT(errorOf(bare, pair), before) << name;
+    EXPECT_GT(errorOf(bare, pair), 0.9 * before) << name << ": should not help by itself";
     EXPECT_LT(errorOf(whole, pair), 0.8 * before) << name;
   }
 }
