@@ -21,6 +21,7 @@ FLOW_ENCODER = [64, 64, 64, 128, 256]
 FLOW_SCALES = [0.8, 0.4, 0.2, 0.1]
 FLOW_INPUTS, FLOW_TARGET_INPUTS = 83, 6
 FLOW_DECODER = [FLOW_INPUTS + 512, 128, 128, 128, 22]
+FLOW_FEWEST, FLOW_PLANE_RIDGE = 0.01, 0.05
 FLOW_PLANES, FLOW_LENGTH, FLOW_PLANE_REACH, FLOW_PLANE_ROUNDING = 256, 0.4, 0.1, 1e-4
 FLOW_VARIANCE, FLOW_RIGID_VARIANCE, FLOW_PLANE_VARIANCE = 0.15 ** 2, 0.5 ** 2, 0.08 ** 2
 FLOW_COARSE_POINTS = 320
@@ -144,8 +145,8 @@ def surroundings(source, deformation, target):
             kernel = kernel.square().square()
         forth, back, seen, weight, deformed, plane_sum, plane_squares = torch.bmm(
             kernel, values).split([3, 3, 1, 1, 3, 3, 9], 2)
-        matrix = (plane_squares / weight).unflatten(2, (3, 3)) + 0.05 * torch.eye(3)
-        vectors += [forth / weight, back / (seen + 0.01), deformed / weight,
+        matrix = (plane_squares / weight).unflatten(2, (3, 3)) + FLOW_PLANE_RIDGE * torch.eye(3)
+        vectors += [forth / weight, back / (seen + FLOW_FEWEST), deformed / weight,
                     torch.linalg.solve(matrix, (plane_sum / weight).unsqueeze(3)).squeeze(3)]
         inputs.append(seen / weight * source.shape[1] / target.shape[1])
     vectors = torch.stack(vectors, 2)
@@ -249,7 +250,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("pairing", choices=PARAMETERS)
-    parser.add_argument("--alpha", type=float, required=True, help="weight of the global loss")
+    parser.add_argument("--alpha", type=float, required=True, help="weight of the global loss; 0: the published rigid module alone")
     for option in ("--cores", "--batch", "--points", "--steps", "--iterations"):
         parser.add_argument(option, type=int, required=True)
     train(parser.parse_args())

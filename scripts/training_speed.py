@@ -7,8 +7,8 @@ Trains networks by UNIRIT_TRAIN and by python's torch in turn, on the same cores
 Markdown table of the medians of their speeds, in pairs a second of the clock and a second of a
 core's time, which other work on the machine disturbs less: the published rigid module, both
 published modules, and the flow module. The python side (torch_training.py) has the same layers,
-batch, points, loss, iterations, an optimiser step after each of them, as many decoded points, and
-the decoder's global columns once a pair. Its clouds lie ready in memory; unirit_train makes its
+batch, points, loss, iterations, an optimiser step after each pass, as many decoded points, and the
+decoder's global columns once a pair. Its clouds lie ready in memory; unirit_train makes its
 pairs meanwhile, on the same cores.
 
 Needs Debian's python3-torch, which nothing else here does, so it is not in packages.txt.
@@ -59,7 +59,7 @@ def rows_of(path):
 
 
 def speed_of_unirit(options, phase, cores):
-    """Pairs a second, and a second of a core, once the rigid iterations have grown: of the second
+    """Pairs a second, and a second of a core, once iterations and steps have grown: of the second
     and third row. A core's time includes that of two validations, a few percent."""
     with tempfile.TemporaryDirectory() as folder:
         curves = os.path.join(folder, "curves.csv")

@@ -2,6 +2,7 @@
 #include "coherent_way.hpp"
 
 #include <cmath>
+#include <stdexcept>
 
 #include "unirit/network/architecture.hpp"
 
@@ -38,6 +39,9 @@ void CoherentWay::fit(const Points& points, const Points& offsets, const Points&
     covariance_(j, j) += kSquaredNoise * (1.0F + offsets.col(j).squaredNorm() / kSquaredReach);
   }
   factor_.compute(covariance_);
+  if (factor_.info() != Eigen::Success) {
+    throw std::runtime_error("the target's planes give no coherent motion of the source");
+  }
   factor_.solveInPlace(gains_);
 
   const Eigen::Matrix<float, 6, 1> motion = kSquaredRigid * wrenches_.lazyProduct(gains_);

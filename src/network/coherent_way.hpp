@@ -14,7 +14,7 @@ namespace unirit {
 class CoherentWay {
  public:
   /// Points p, the offsets o to points of their planes and the normals n, [3, N] each; allocates
-  /// nothing where the number stays.
+  /// nothing where the number stays. Throws std::runtime_error where rounding leaves no solution.
   void fit(const Points& points, const Points& offsets, const Points& normals);
 
   /// Of each p, what it adds to d: d(x) = sum of e^(-|x - p|^2 / 2 l^2) times this.

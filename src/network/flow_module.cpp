@@ -68,7 +68,7 @@ void deformationInto(const RigidStep& fit, const Points& start, const Points& re
   }
 }
 
-/// Buffers of a stage, whose clouds may be of other sizes than the other stage's.
+/// Buffers for clouds of one size.
 struct FlowStage {
   explicit FlowStage(Workspace& workspace) : surroundings(workspace) {}
 

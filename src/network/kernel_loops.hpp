@@ -287,7 +287,7 @@ struct Loops {
     Vector sum[kAveraged];
     for (int k = 0; k < kAveraged; ++k) sum[k] = totals[k];
     for (long i = 0; i < count; ++i) {
-#pragma GCC unroll 23
+#pragma GCC unroll kAveraged
       for (int k = 0; k < kAveraged; ++k) sum[k] += weights[i] * values[kAveraged * i + k];
     }
     for (int k = 0; k < kAveraged; ++k) totals[k] = sum[k];

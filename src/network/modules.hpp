@@ -16,7 +16,8 @@ class Modules {
  public:
   virtual ~Modules() = default;
 
-  /// A rigid iteration from where the source has been moved; the first of these clouds, the last?
+  /// A rigid iteration from where the source has been moved. `first`: of these clouds; `last`: none
+  /// follows.
   virtual RigidStep rigidStep(const Points& moved, const Points& target, bool first, bool last) = 0;
 
   /// Writes the displacements of `queries`, whose size they have, given the rigidly moved source.

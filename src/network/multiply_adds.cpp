@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
-#include "unirit/network/network.hpp"
-
 #include <algorithm>
+
+#include "unirit/network/network.hpp"
 
 namespace unirit {
 namespace {
@@ -33,7 +33,7 @@ double multiplyAdds(Eigen::Index source_points, Eigen::Index target_points, int 
   const auto targets = static_cast<double>(target_points);
   if (pairing == Pairing::kOffsets) {
     const double few = kFlowCoarsePoints;
-    return (rigid_iterations - 1) * kFlowCoarseSteps *
+    return std::max(rigid_iterations - 1, 0) * kFlowCoarseSteps *
                flowMultiplyAdds(std::min(sources, few), std::min(targets, few), with_savings) +
            (kFlowFineSteps + kFlowNonRigidSteps) * flowMultiplyAdds(sources, targets, with_savings);
   }

@@ -12,7 +12,7 @@ namespace unirit {
 struct RigidStep {
   Eigen::Quaternionf rotation;
   Eigen::Vector3f translation;
-  bool converged = false;  ///< the next may be the last
+  bool converged = false;  ///< one more is enough
 };
 
 /// Reads a step off the features of the moved source and the target.

@@ -9,14 +9,16 @@
 
 namespace unirit {
 
-/// What the flow module reads about the points of two clouds (see architecture.hpp). Results depend
-/// on the points' order in the last bits, and in which of two equally near points is taken. Holds
-/// buffers that grow to the largest clouds seen.
+/// What the flow module reads about the points of two clouds (see architecture.hpp). The target's
+/// order decides which of its planes the coherent way is fitted to; else results depend on either
+/// order in the last bits, and in which of two equally near points is taken. Holds buffers that
+/// grow to the largest clouds seen.
 class Surroundings {
  public:
   explicit Surroundings(Workspace& workspace) : workspace_(workspace) {}
 
-  /// The first to be called; the normals of its surface are estimated.
+  /// The first to be called; the normals of its surface are estimated. Points in the order of their
+  /// coordinates spread over the surface those whose planes are fitted to.
   void setTarget(const Points& target);
 
   /// `deformation`: of each point.

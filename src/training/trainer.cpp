@@ -134,7 +134,9 @@ torch::Tensor updates(int passes, Unirit& model, torch::optim::Adam& optimiser, 
   return loss / passes;
 }
 
-/// The iterations of the rigid stage by flow: all but the last are coarse.
+/// The iterations of the rigid stage by flow: all but the last are coarse. Only those need the
+/// order of the coordinates, to choose points; elsewhere random ones serve for the coherent way as
+/// well.
 torch::Tensor learnRigidFlow(Unirit& model, torch::optim::Adam& optimiser, Batch& batch,
                              const TrainingSettings& settings, std::int64_t step) {
   torch::Tensor loss = torch::zeros({}, batch.source.options());

@@ -51,7 +51,7 @@ TEST(Model, ReadsTheSurroundingsAlikeOnEveryDevice) {
            torch::nn::functional::normalize(torch::randn({2, points, 3}),
                                             torch::nn::functional::NormalizeFuncOptions().dim(2));
   };
-  const auto source = onASphere(50), target = onASphere(200);
+  const auto source = onASphere(50), target = onASphere(kFlowPlanes + 44);
   const auto deformation = 0.1 * torch::randn({2, 50, 3});
   const Surroundings a = surroundings(source, deformation, target),
                      b = onAnyDevice(source, deformation, target);

@@ -44,7 +44,7 @@ inline Eigen::Matrix3Xd normals(const Eigen::Matrix3Xd& points) {
 }
 
 /// Of the motion of two points, rigid and smoothly deforming.
-inline Eigen::Matrix3d covariance(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+inline Eigen::Matrix3d motionCovariance(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
   const auto turned = [](const Eigen::Vector3d& p) {
     return (Eigen::Matrix3d() << 0, p[2], -p[1], -p[2], 0, p[0], p[1], -p[0], 0).finished();
   };
@@ -74,7 +74,8 @@ inline Eigen::Matrix3Xd coherentWay(const Eigen::Matrix3Xd& source, const Eigen:
   Eigen::MatrixXd of_ways = noise.asDiagonal();
   for (Eigen::Index a = 0; a < count; ++a) {
     for (Eigen::Index b = 0; b < count; ++b) {
-      of_ways(a, b) += planes.col(a).dot(covariance(points.col(a), points.col(b)) * planes.col(b));
+      of_ways(a, b) +=
+          planes.col(a).dot(motionCovariance(points.col(a), points.col(b)) * planes.col(b));
     }
   }
   of_ways.diagonal() += kFlowPlaneRounding * (of_ways.diagonal() - noise);
@@ -82,7 +83,7 @@ inline Eigen::Matrix3Xd coherentWay(const Eigen::Matrix3Xd& source, const Eigen:
   Eigen::Matrix3Xd motion = Eigen::Matrix3Xd::Zero(3, queries.cols());
   for (Eigen::Index q = 0; q < queries.cols(); ++q) {
     for (Eigen::Index k = 0; k < count; ++k) {
-      motion.col(q) += covariance(queries.col(q), points.col(k)) * planes.col(k) * gains[k];
+      motion.col(q) += motionCovariance(queries.col(q), points.col(k)) * planes.col(k) * gains[k];
     }
   }
   return motion;

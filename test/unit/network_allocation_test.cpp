@@ -18,7 +18,7 @@ TEST_F(NetworkAllocation, theCounterCounts) {
 }
 
 TEST_F(NetworkAllocation, nothingIsAllocatedAfterTheFirstCall) {
-  const Points source = reference::randomPoints(1100, 1);  // more than either stage reads whole
+  const Points source = reference::randomPoints(1100, 1);  // more than are read at once
   const Points target = reference::randomPoints(700, 2);
   const Points queries = reference::randomPoints(317, 3);
   for (const Pairing pairing : {Pairing::kNearest, Pairing::kOffsets}) {

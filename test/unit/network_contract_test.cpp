@@ -122,6 +122,21 @@ TEST(NetworkContract, theRotationStaysARotation) {
   }
 }
 
+TEST(NetworkContract, theFlowEndsWithAFineIterationOnceACoarseOneHardlyMoves) {
+  auto still = std::make_shared<Weights>(randomWeights(Pairing::kOffsets, 1));
+  still->layers.at("flow.decoder.3").weight.setZero();
+  const Points source = randomPoints(40, 1), target = randomPoints(40, 2);
+  const auto iterationsOf = [&](int at_most) {
+    std::vector<Eigen::Isometry3f> iterates;
+    Network(still, {at_most, Pairing::kOffsets}, 1).estimateRigid(source, target, &iterates);
+    return iterates.size();
+  };
+  EXPECT_EQ(iterationsOf(8), 2U);
+  EXPECT_EQ(iterationsOf(1), 1U);
+  still->layers.at("flow.decoder.3").bias[0] = 0.1F;  // three steps of it are too far
+  EXPECT_EQ(iterationsOf(8), 8U);
+}
+
 TEST(NetworkContract, aTargetThatIsMirroredIsNotReachedByAReflection) {
   auto weights = std::make_shared<Weights>(randomWeights(Pairing::kOffsets, 1));
   Layer& last = weights->layers.at("flow.decoder.3");
@@ -164,7 +179,7 @@ TEST(NetworkContract, costsAreThoseOfThePaper) {
   EXPECT_LT(giga(8, true, Pairing::kNone), giga(8, true));
 }
 
-TEST(NetworkContract, theRigidStageOfTheFlowReadsFewerPoints) {
+TEST(NetworkContract, coarseIterationsOfTheFlowReadFewerPoints) {
   const double encoders = (83 + 6) * 64 + 2 * (64 * 64 + 64 * 64 + 64 * 128 + 128 * 256),
                decoder = 83 * 128 + 2 * 128 * 128 + 128 * 22, global = 512 * 128;
   const auto cost = [](int iterations, bool with_savings) {

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <array>
-#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -33,16 +32,14 @@ inline constexpr std::array<float, 4> kFlowScales{0.8F, 0.4F, 0.2F, 0.1F};  ///<
 inline constexpr float kFlowFewest = 0.01F;
 /// Weight of staying where one is, beside the target's planes, in the way to them.
 inline constexpr float kFlowPlaneRidge = 0.05F;
-/// The coherent way to the target's planes (see coherent_way.hpp): of how many of the target's
-/// points, the deformation's length and amplitude, the rigid motion's, the noise of a plane, the
-/// offset at which its variance doubles [half extents].
-inline constexpr int kFlowPlanes = 256;
-inline constexpr float kFlowLength = kFlowScales[1];
+/// The coherent way to the target's planes (see coherent_way.hpp); lengths in half extents.
+inline constexpr int kFlowPlanes = 256;               ///< at most, evenly chosen
+inline constexpr float kFlowLength = kFlowScales[1];  ///< of the deformation
 inline constexpr float kFlowAmplitude = 0.15F;
-inline constexpr float kFlowRigidAmplitude = 0.5F;
+inline constexpr float kFlowRigidAmplitude = 0.5F;  ///< of translation and rotation vector
 inline constexpr float kFlowPlaneNoise = 0.08F;
-inline constexpr float kFlowPlaneReach = 0.1F;
-/// Share of its own variance that is taken for noise, too, against rounding where clouds are large.
+inline constexpr float kFlowPlaneReach = 0.1F;  ///< offset at which the noise's variance doubles
+/// Share of a plane's own variance that is noise, too: more than rounding makes of any cloud.
 inline constexpr float kFlowPlaneRounding = 1e-4F;
 inline constexpr int kFlowVectors = 3 + 4 * static_cast<int>(kFlowScales.size());
 /// Point (3), for each scale the share of the target found there, the vectors, their lengths.
