@@ -62,8 +62,8 @@ class Network {
 
 /// Multiply-adds of the layers in one forward pass with n rigid iterations, as published and with
 /// the exact savings (the published rigid module's target feature once, in both counts; the
-/// decoder's global columns once per pair). What the flow module reads
-/// about the points is not counted.
+/// decoder's global columns once per pair). What the flow module reads about the points is not
+/// counted.
 double multiplyAdds(Eigen::Index source_points, Eigen::Index target_points, int rigid_iterations,
                     Pairing pairing, bool with_savings);
 
