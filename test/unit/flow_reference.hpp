@@ -153,9 +153,10 @@ inline Eigen::Matrix3Xd flow(const Weights& weights, const MovingCloud& source,
                              const Eigen::Matrix3Xd& target, const MovingCloud& queries) {
   Eigen::MatrixXd of_target(kFlowTargetInputs, target.cols());
   of_target << target, offsets(target, source.reached);
-  const Eigen::VectorXd both =
-      features(weights, "flow", surroundings(source, target, source), of_target);
-  const Eigen::MatrixXd read = surroundings(source, target, queries);
+  const Eigen::MatrixXd of_source = surroundings(source, target, source);
+  const Eigen::VectorXd both = features(weights, "flow", of_source, of_target);
+  const Eigen::MatrixXd read =
+      &queries == &source ? of_source : surroundings(source, target, queries);
   Eigen::MatrixXd inputs(kFlowInputs + both.size(), queries.reached.cols());
   inputs << read, both.replicate(1, queries.reached.cols());
   const Eigen::MatrixXd outputs = decode(weights, "flow.decoder", inputs);
@@ -172,7 +173,7 @@ inline void followFlow(const Weights& weights, int steps, MovingCloud& source,
                        const Eigen::Matrix3Xd& target, MovingCloud& queries) {
   for (int step = 0; step < steps; ++step) {
     const Eigen::Matrix3Xd of_source = flow(weights, source, target, source);
-    queries.reached += flow(weights, source, target, queries);
+    if (queries.reached.cols() > 0) queries.reached += flow(weights, source, target, queries);
     source.reached += of_source;
   }
 }
