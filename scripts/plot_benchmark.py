@@ -214,4 +214,6 @@ def main(folder, output=None):
 if __name__ == "__main__":
     if len(sys.argv) not in (2, 3):
         sys.exit(__doc__)
+    if not os.path.exists(os.path.join(sys.argv[1], "cases.csv")):
+        sys.exit(f"{sys.argv[1]}: holds no cases.csv; it is unirit_benchmark that writes one")
     main(*sys.argv[1:])

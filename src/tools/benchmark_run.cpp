@@ -169,6 +169,9 @@ std::vector<BenchmarkRecord> runBenchmark(const BenchmarkOptions& options) {
 }
 
 std::vector<BenchmarkRecord> mergeShards(const std::string& folder) {
+  if (!std::filesystem::is_directory(folder)) {
+    throw std::runtime_error("\"" + folder + "\" is not a folder.");
+  }
   std::set<std::string> paths;  // sorted, so that the merged file does not depend on the folder
   for (const auto& entry : std::filesystem::directory_iterator(folder)) {
     const std::string name = entry.path().filename().string();

@@ -212,6 +212,7 @@ TEST_F(BenchmarkTool, RefusesFaultyRequestsInASentence) {
   };
   const std::string phantoms = "--phantoms 1 --points 64 --output new ";
   refuses("", "one of --data, --phantoms, --cases, --merge");
+  refuses("--merge --output nowhere", "\"nowhere\" is not a folder");
   refuses(phantoms + "--methods cdp", "unknown");
   refuses(phantoms + "--methods unirit", "needs weights");
   refuses(phantoms + "--protocols caseA --methods identity", "unknown protocol 'caseA'");
