@@ -3,11 +3,11 @@
 
 #include <chrono>
 #include <cmath>
-#include <fstream>
 #include <future>
 #include <stdexcept>
 
 #include "checkpoint.hpp"
+#include "curves.hpp"
 #include "surroundings.hpp"
 
 namespace unirit::training {
@@ -111,8 +111,8 @@ torch::Tensor update(Unirit& model, torch::optim::Adam& optimiser, Batch& batch,
   });
   if (moved.front().defined()) {
     const auto reached = torch::cat(moved);
-    const auto distance_left = (reached - batch.truth).square().sum(2, true).mean(1, true).sqrt();
-    batch.source = torch::where(distance_left < kAstray, reached, batch.start);
+    const auto near = (rootMeanSquare(reached - batch.truth) < kAstray).view({-1, 1, 1});
+    batch.source = torch::where(near, reached, batch.start);
   }
 
   for (std::size_t i = 0; i < parameters.size(); ++i) {
@@ -183,13 +183,15 @@ struct ValidationSet {
   Batch pairs;
 };
 
+std::vector<Protocol> validationProtocols(const TrainingSettings& settings) {
+  if (settings.batch.target == View::Target::kPaired) return {Protocol::kPaired};
+  return {Protocol::kCaseB, Protocol::kResampled, Protocol::kPartial, Protocol::kIntraop};
+}
+
 std::vector<ValidationSet> validationSets(const std::vector<Organ>& organs,
                                           const TrainingSettings& settings) {
-  std::vector<Protocol> protocols{Protocol::kCaseB, Protocol::kResampled, Protocol::kPartial,
-                                  Protocol::kIntraop};
-  if (settings.batch.target == View::Target::kPaired) protocols = {Protocol::kPaired};
   std::vector<ValidationSet> sets;
-  for (const Protocol protocol : protocols) {
+  for (const Protocol protocol : validationProtocols(settings)) {
     sets.push_back({protocol, makeValidation(organs, protocol, kValidationPairs, kValidationPoints,
                                              settings.seed)});
   }
@@ -221,35 +223,6 @@ double learningRate(const TrainingSettings& settings, std::int64_t step) {
          std::min(1.0, (static_cast<double>(step) + 1.0) / kWarmUpSteps);
 }
 
-class Curves {
- public:
-  Curves(const std::filesystem::path& path, bool resumed,
-         const std::vector<ValidationSet>& validation)
-      : file_(path, resumed ? std::ios::app : std::ios::trunc) {
-    if (!file_) throw std::runtime_error(path.string() + ": cannot be written");
-    if (!resumed) {
-      file_ << "step,seconds,pairs_per_second,learning_rate,loss";
-      for (const ValidationSet& set : validation) {
-        file_ << ',' << toString(set.protocol) << "_rigid_mm," << toString(set.protocol)
-              << "_final_mm";
-      }
-      file_ << std::endl;
-    }
-  }
-
-  void append(const Progress& p) {
-    file_ << p.step << ',' << p.seconds << ',' << p.pairs_per_second << ',' << p.learning_rate
-          << ',' << p.loss;
-    for (const ValidationErrors& errors : p.validation) {
-      file_ << ',' << 1000.0 * errors.rigid << ',' << 1000.0 * errors.final;
-    }
-    file_ << std::endl;
-  }
-
- private:
-  std::ofstream file_;
-};
-
 }  // namespace
 
 Unirit train(const std::vector<Organ>& organs, const std::vector<Organ>& validation,
@@ -263,7 +236,7 @@ Unirit train(const std::vector<Organ>& organs, const std::vector<Organ>& validat
   double seconds_before = 0.0;
   const bool resumed = checkpoint.load(model, optimiser, step, seconds_before);
   const auto validation_sets = validationSets(validation, settings);
-  Curves curves(folder / "curves.csv", resumed, validation_sets);
+  Curves curves(folder / "curves.csv", resumed, validationProtocols(settings));
   BatchQueue queue(organs, settings.batch, settings.seed, step, settings.data_threads);
 
   using Clock = std::chrono::steady_clock;
