@@ -151,9 +151,7 @@ torch::Tensor FlowModuleImpl::forward(const torch::Tensor& start, const torch::T
 }
 
 torch::Tensor coarseOrder(const torch::Tensor& points) {
-  const std::int64_t all = points.size(1), kept = std::min<std::int64_t>(all, kFlowCoarsePoints);
-  const auto places =
-      torch::div(torch::arange(kept, points.options().dtype(torch::kLong)) * all, kept, "floor");
+  const auto places = evenlyChosen(points.size(1), kFlowCoarsePoints, points.device());
   return points.select(2, 0).argsort(1, false).index_select(1, places);
 }
 

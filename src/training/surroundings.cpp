@@ -51,8 +51,7 @@ torch::Tensor normalsOf(const torch::Tensor& points) {
 /// the target's points, which have these normals and nearest points of the source.
 torch::Tensor coherentWay(const torch::Tensor& source, const torch::Tensor& target,
                           const torch::Tensor& normals, const torch::Tensor& nearest) {
-  const std::int64_t all = target.size(1), count = std::min<std::int64_t>(all, kFlowPlanes);
-  const auto chosen = torch::div(torch::arange(count, nearest.options()) * all, count, "floor");
+  const auto chosen = evenlyChosen(target.size(1), kFlowPlanes, target.device());
   const auto normal = normals.index_select(1, chosen);
   const auto point = source.gather(1, ofPoints(nearest.index_select(1, chosen)));
   const auto offset = target.index_select(1, chosen) - point;
@@ -85,6 +84,12 @@ torch::Tensor offsets(const torch::Tensor& from, const torch::Tensor& to) {
     nearest = torch::cdist(from, to).argmin(2);
   }
   return to.gather(1, ofPoints(nearest)) - from;
+}
+
+torch::Tensor evenlyChosen(std::int64_t all, std::int64_t at_most, torch::Device device) {
+  const std::int64_t count = std::min(all, at_most);
+  const auto numbers = torch::arange(count, torch::TensorOptions(torch::kLong).device(device));
+  return torch::div(numbers * all, count, "floor");
 }
 
 Surroundings surroundings(const torch::Tensor& source, const torch::Tensor& deformation,

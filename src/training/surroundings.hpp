@@ -8,6 +8,9 @@ namespace unirit::training {
 /// From each point to its nearest neighbour in `to`: [B, N, 3].
 torch::Tensor offsets(const torch::Tensor& from, const torch::Tensor& to);
 
+/// At most so many of the numbers from 0 to all - 1, evenly spread: [min(all, at_most)].
+torch::Tensor evenlyChosen(std::int64_t all, std::int64_t at_most, torch::Device device);
+
 /// What the flow module reads of two clouds, as architecture.hpp lists it.
 struct Surroundings {
   torch::Tensor of_source;  ///< [B, N, kFlowInputs]
