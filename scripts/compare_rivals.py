@@ -30,6 +30,13 @@ BCPD = [{"beta": 2, "lambda": 2, "omega": 0, "gamma": 1, "scale": 1},
         {"beta": 0.7, "lambda": 5, "omega": 0.3, "gamma": 1, "scale": 1}]
 
 
+def require(*paths):
+    """Before minutes of building."""
+    for path in paths:
+        if not os.path.exists(path):
+            sys.exit(f"{path}: no such file or folder")
+
+
 def run(*command):
     quiet = dict(os.environ, OMP_NUM_THREADS="1")
     subprocess.run([str(word) for word in command], check=True, env=quiet,
@@ -113,6 +120,8 @@ def compare(program, cases, folder):
 
 
 def main(cpd, bcpd, program, *cases):
+    require(f"{cpd}/include/cpd", f"{bcpd}/register", program,
+            *(f"{case}/{cloud}.ply" for case in cases for cloud in ("source", "target")))
     with tempfile.TemporaryDirectory() as folder:
         build(os.path.abspath(cpd), os.path.abspath(bcpd), folder)
         worst = compare(program, cases, folder)

@@ -21,7 +21,7 @@ import tempfile
 
 import numpy as np
 
-from compare_rivals import build, theirs, write_clouds
+from compare_rivals import build, require, theirs, write_clouds
 
 WEIGHTS = os.path.join(os.path.dirname(os.path.abspath(__file__)), "../models/unirit.safetensors")
 EVERY = 15
@@ -62,6 +62,7 @@ def time_of_origin(row, cases, folder, options=()):
 
 
 def main(cpd, bcpd, program, cases):
+    require(f"{cpd}/include/cpd", f"{bcpd}/register", program, cases)
     with tempfile.TemporaryDirectory() as folder:
         build(os.path.abspath(cpd), os.path.abspath(bcpd), folder)
         rows = benchmark_rows(program, cases, folder)
