@@ -37,6 +37,12 @@ runTests() {
   done
 }
 
+# One of the tests builds the package once more, without ROS: what compiles alike there is not
+# compiled again.
+if command -v ccache >/dev/null; then
+  export CMAKE_CXX_COMPILER_LAUNCHER=ccache CCACHE_DIR=${CCACHE_DIR:-$root/build/ccache}
+fi
+
 configure "$root/build"
 build "$root/build" all
 # without LibTorch, which knows nothing of sanitizers
