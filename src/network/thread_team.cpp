@@ -1,9 +1,23 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "thread_team.hpp"
 
+#include <chrono>
 #include <stdexcept>
 
 namespace unirit {
+namespace {
+
+constexpr std::chrono::microseconds kPatience(100);
+
+/// Waits for what may soon be true, while others may run: to fall asleep and be woken takes longer
+/// than many a loop.
+template <class Done>
+void yieldUntil(const Done& done) {
+  const auto end = std::chrono::steady_clock::now() + kPatience;
+  while (!done() && std::chrono::steady_clock::now() < end) std::this_thread::yield();
+}
+
+}  // namespace
 
 ThreadTeam::ThreadTeam(int size) {
   if (size < 1) {
@@ -44,6 +58,11 @@ void ThreadTeam::run(long count, const Job& job) {
   // Closed to workers that have not begun; those that have finish their item
   std::unique_lock<std::mutex> lock(mutex_);
   job_ = nullptr;
+  if (busy_workers_ > 0) {
+    lock.unlock();
+    yieldUntil([this] { return busy_workers_ == 0; });
+    lock.lock();
+  }
   idle_.wait(lock, [this] { return busy_workers_ == 0; });
 }
 
@@ -51,6 +70,9 @@ void ThreadTeam::serve(int thread) {
   unsigned long last_job = 0;
   std::unique_lock<std::mutex> lock(mutex_);
   while (true) {
+    lock.unlock();
+    yieldUntil([&] { return job_number_ != last_job; });
+    lock.lock();
     wake_.wait(lock, [&] { return stopping_ || (job_ != nullptr && job_number_ != last_job); });
     if (stopping_) {
       return;

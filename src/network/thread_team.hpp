@@ -40,9 +40,9 @@ class ThreadTeam {
   std::mutex mutex_;
   std::condition_variable wake_;
   std::condition_variable idle_;
-  const Job* job_ = nullptr;  ///< open to workers; guarded by the mutex, as are the next three
-  unsigned long job_number_ = 0;
-  int busy_workers_ = 0;
+  const Job* job_ = nullptr;  ///< open to workers; written under the mutex, as are the next three
+  std::atomic<unsigned long> job_number_{0};
+  std::atomic<int> busy_workers_{0};
   bool stopping_ = false;
   long count_ = 0;  ///< of the job; written while no worker is busy
   std::atomic<long> next_item_{0};
