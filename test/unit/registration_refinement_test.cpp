@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 
 #include "lenient_limits.hpp"
 #include "unirit/evaluation/pair.hpp"
@@ -180,14 +181,14 @@ TEST(RegistrationStages, RefuseOtherOrgansAndAcceptTheirOwn) {
   settings.stages = {Stage::kRefine};
   Registrar registrar(std::make_shared<const Weights>(randomWeights(NetworkSettings().pairing, 1)),
                       settings);
+  std::map<std::string, RegistrationPair> pairs;
+  for (const std::string& name : phantomOrgans()) pairs[name] = pairOf(name, Protocol::kResampled);
   int others = 0, others_refused = 0;
-  for (const std::string& name : phantomOrgans()) {
-    const RegistrationPair own = pairOf(name, Protocol::kResampled);
-    for (const std::string& other : phantomOrgans()) {
-      const RegistrationPair pair = pairOf(other, Protocol::kResampled);
-      const Registration registration =
-          registrar.registerClouds(organ(own), seen(pair), alignCentroids(organ(own), seen(pair)));
-      if (name == other) {
+  for (const auto& [name, own] : pairs) {
+    for (const auto& [other_name, other] : pairs) {
+      const Registration registration = registrar.registerClouds(
+          organ(own), seen(other), alignCentroids(organ(own), seen(other)));
+      if (name == other_name) {
         EXPECT_TRUE(registration.succeeded()) << name << ": " << registration.message;
         continue;
       }
