@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 // Speed of the refinement, of the whole pipeline and of what they are compared with, on the same
 // clouds: a phantom liver under a random deformation, seen whole or from one side.
+#include <algorithm>
 #include <ctime>
 #include <map>
 #include <string>
@@ -9,6 +10,7 @@
 #include "refinement/refinement.hpp"
 #include "speed.hpp"
 #include "unirit/evaluation/method_factory.hpp"
+#include "unirit/random.hpp"
 #include "unirit/registration.hpp"
 #include "unirit/sampling.hpp"
 #include "unirit/simulation/phantom.hpp"
@@ -75,8 +77,9 @@ RegistrationSettings settingsOf(const benchmark::State& state) {
   return settings;
 }
 
-void registerClouds(benchmark::State& state, const PointCloud& preoperative,
-                    const PointCloud& intraoperative, bool warm) {
+/// Returns the first registration.
+Registration registerClouds(benchmark::State& state, const PointCloud& preoperative,
+                            const PointCloud& intraoperative, bool warm) {
   Registrar registrar(weights(NetworkSettings().pairing), settingsOf(state));
   const auto registerFrom = [&](const Eigen::Isometry3d& start, const Earlier* earlier) {
     return registrar.registerClouds(preoperative, intraoperative, start, earlier);
@@ -87,6 +90,7 @@ void registerClouds(benchmark::State& state, const PointCloud& preoperative,
     benchmark::DoNotOptimize(warm ? registerFrom(earlier.T_intraoperative_preoperative, &earlier)
                                   : registerFrom(Eigen::Isometry3d::Identity(), nullptr));
   }
+  return first;
 }
 
 /// Everything from two clouds to a registration that has been judged.
@@ -96,7 +100,24 @@ void pipeline(benchmark::State& state, Protocol protocol, bool warm) {
                  warm);
 }
 
-/// The same with a camera's cloud and an organ's mesh.
+/// The same with points scattered about the organ, which no refinement fits: the network is run,
+/// and the refinement again.
+void pipelineAstray(benchmark::State& state) {
+  const RegistrationPair& pair = pairOf(Protocol::kResampled);
+  Random random(1);
+  const Eigen::Vector3d corner = pair.source.rowwise().maxCoeff().cast<double>();
+  Points scattered(3, kPoints);
+  for (auto point : scattered.colwise()) {
+    point = random.uniformVector(-corner, corner).cast<float>();
+  }
+  const Registration first =
+      registerClouds(state, {pair.source, pair.source_normals}, {scattered, {}}, false);
+  const bool ran = std::any_of(first.stages.begin(), first.stages.end(),
+                               [](const StageTime& time) { return time.stage == "rigid"; });
+  if (!ran) state.SkipWithError("the network was not run");
+}
+
+/// Everything with a camera's cloud and an organ's mesh.
 void pipelineOfCamera(benchmark::State& state, bool warm) {
   const Surface organ = makePhantom("liver", 1, static_cast<int>(kVertices));
   const PointCloud seen{sampleByArea(organ, kCameraPoints, 1).points, {}};
@@ -158,6 +179,7 @@ const bool registered = [] {
       onThreads(benchmark::RegisterBenchmark(name.c_str(), pipeline, protocol, warm));
     }
   }
+  onThreads(benchmark::RegisterBenchmark("pipeline/cold/astray", pipelineAstray));
   onThreads(benchmark::RegisterBenchmark("pipeline/cold/camera", pipelineOfCamera, false));
   onThreads(benchmark::RegisterBenchmark("pipeline/warm/camera", pipelineOfCamera, true));
   onThreads(benchmark::RegisterBenchmark("dense/first", dense, true));

@@ -73,9 +73,9 @@ struct Registrar::Implementation {
   /// In the network's unit and the organ's frame, as the guess has it.
   struct Found {
     Eigen::Isometry3f rigid = Eigen::Isometry3f::Identity();
-    Points displacements;  // of the network, at every point of the organ where nothing was refined
-    Sighting sighting;     // where something was
-    std::optional<Refined> refined;
+    Points displacements;  // of the network, at every point of the organ
+    Sighting sighting;
+    std::optional<Refined> refined;  // takes the place of the displacements
   };
 
   Implementation(std::shared_ptr<const Weights> new_weights,
@@ -87,15 +87,15 @@ struct Registrar::Implementation {
 
   Registration run(const PointCloud& preoperative, const PointCloud& intraoperative,
                    const Eigen::Isometry3d& guess, const Earlier* earlier);
-  Found search(const PointCloud& target, const Eigen::Isometry3d& guess, const Earlier* earlier,
-               std::vector<StageTime>& stages);
+  Found searchByNetwork(const Points& target, std::vector<StageTime>& stages);
+  Found searchByRefinement(const PointCloud& target, const Eigen::Isometry3d& guess,
+                           const Earlier* earlier, std::vector<StageTime>& stages);
   void describe(const Found& found, const Eigen::Isometry3d& guess,
                 const PointCloud& intraoperative, Registration& registration);
   void judge(const Found& found, const Points& target, const Eigen::Isometry3d& guess,
              const Earlier* earlier, Registration& registration);
 
-  Refined refineFrom(const Eigen::Isometry3f& start, const Sighting& sighting,
-                     const Points& displacements);
+  Refined refineFrom(const Eigen::Isometry3f& start, const Sighting& sighting);
   Refined refineFromStart(const Sighting& sighting, const Eigen::Isometry3d& guess,
                           const Earlier* earlier);
   RefinementQuality qualityOf(const Found& found, const Deformation& deformation, bool cold);
@@ -124,7 +124,9 @@ Registration Registrar::Implementation::run(const PointCloud& preoperative,
     }
     target = model->sample(intraoperative, guess.inverse());
   });
-  const Found found = search(target, guess, earlier, registration.stages);
+  const Found found = settings.runs(Stage::kRefine)
+                          ? searchByRefinement(target, guess, earlier, registration.stages)
+                          : searchByNetwork(target.points, registration.stages);
   timed("assessment", registration.stages, [&] {
     describe(found, guess, intraoperative, registration);
     judge(found, target.points, guess, earlier, registration);
@@ -132,49 +134,44 @@ Registration Registrar::Implementation::run(const PointCloud& preoperative,
   return registration;
 }
 
-/// Where the refinement fits well from the start, the network's modules are passed over.
-Registrar::Implementation::Found Registrar::Implementation::search(const PointCloud& target,
-                                                                   const Eigen::Isometry3d& guess,
-                                                                   const Earlier* earlier,
-                                                                   std::vector<StageTime>& stages) {
+/// The paper's two stages.
+Registrar::Implementation::Found Registrar::Implementation::searchByNetwork(
+    const Points& target, std::vector<StageTime>& stages) {
   Found found;
-  Eigen::Isometry3f& rigid = found.rigid;
-  Points& displacements = found.displacements;
-  std::optional<Refined>& refined = found.refined;
-
-  // Refinement from the start
-  const bool refines = settings.runs(Stage::kRefine);
-  if (refines) {
-    timed("refine", stages, [&] {
-      found.sighting = model->refinement->sight(target);
-      refined = refineFromStart(found.sighting, guess, earlier);
-    });
+  const Points& source = model->sampled.points;
+  if (settings.runs(Stage::kRigid)) {
+    timed("rigid", stages, [&] { found.rigid = network.estimateRigid(source, target); });
   }
-  const bool fits = refined && refined->fit > kPoorFit;
-
-  // Rigid stage
-  if (settings.runs(Stage::kRigid) && !fits) {
-    timed("rigid", stages,
-          [&] { rigid = network.estimateRigid(model->sampled.points, target.points); });
-  }
-
-  // Non-rigid stage, decoded at every point of the organ or where the refinement starts from
-  const Points& queries = refines ? model->sampled.points : model->vertices;
-  displacements.setZero(3, queries.cols());
-  if (settings.runs(Stage::kNonRigid) && !fits) {
+  found.displacements.setZero(3, model->vertices.cols());
+  if (settings.runs(Stage::kNonRigid)) {
     timed("nonrigid", stages, [&] {
-      displacements = network.estimateDisplacements(rigid * model->sampled.points, target.points,
-                                                    rigid * queries);
+      found.displacements = network.estimateDisplacements(found.rigid * source, target,
+                                                          found.rigid * model->vertices);
     });
   }
+  return found;
+}
 
-  // Refinement from where the network left the organ
-  if (refined && !fits && settings.stages.front() != Stage::kRefine) {
+/// From the start and, where that fits poorly, from where the network moves the organ rigidly.
+/// Beginning from its displacement as well, or from its fine iteration, was not more accurate.
+Registrar::Implementation::Found Registrar::Implementation::searchByRefinement(
+    const PointCloud& target, const Eigen::Isometry3d& guess, const Earlier* earlier,
+    std::vector<StageTime>& stages) {
+  Found found;
+  timed("refine", stages, [&] {
+    found.sighting = model->refinement->sight(target);
+    found.refined = refineFromStart(found.sighting, guess, earlier);
+  });
+  const bool fits = found.refined->fit > kPoorFit;
+  if (settings.runs(Stage::kRigid) && !fits) {
+    Eigen::Isometry3f start = Eigen::Isometry3f::Identity();
+    timed("rigid", stages,
+          [&] { start = network.estimateRigidCoarsely(model->sampled.points, target.points); });
     timed("refine", stages, [&] {
-      keepBetter(refineFrom(rigid, found.sighting, displacements), found.sighting.whole, *refined);
+      keepBetter(refineFrom(start, found.sighting), found.sighting.whole, *found.refined);
     });
   }
-  if (refined) rigid = refined->pose;
+  found.rigid = found.refined->pose;
   return found;
 }
 
@@ -207,14 +204,12 @@ void Registrar::Implementation::judge(const Found& found, const Points& target,
   applyChecks(checkOutput(registration, start, model->extent, settings.plausibility), registration);
 }
 
-/// The refinement from a pose, and about it; displacements of the samples after it.
+/// The refinement from a pose, and about it.
 Refined Registrar::Implementation::refineFrom(const Eigen::Isometry3f& start,
-                                              const Sighting& sighting,
-                                              const Points& displacements) {
-  const Eigen::Isometry3f to_start = start.inverse();
-  Refined refined =
-      model->refinement->refine(moved(to_start, sighting),
-                                {Eigen::Isometry3f::Identity(), to_start.linear() * displacements});
+                                              const Sighting& sighting) {
+  Refined refined = model->refinement->refine(
+      moved(start.inverse(), sighting),
+      {Eigen::Isometry3f::Identity(), Points::Zero(3, model->sampled.size())});
   refined.pose = start * refined.pose;
   return refined;
 }
@@ -224,10 +219,7 @@ Refined Registrar::Implementation::refineFrom(const Eigen::Isometry3f& start,
 Refined Registrar::Implementation::refineFromStart(const Sighting& sighting,
                                                    const Eigen::Isometry3d& guess,
                                                    const Earlier* earlier) {
-  const auto afar = [&] {
-    return model->refinement->refine(
-        sighting, {Eigen::Isometry3f::Identity(), Points::Zero(3, model->sampled.size())});
-  };
+  const auto afar = [&] { return refineFrom(Eigen::Isometry3f::Identity(), sighting); };
   if (earlier == nullptr) return afar();
   const Deformation& found = *earlier->deformation;
   const Points moved = found.move(model->samples) - found.moveRigidly(model->samples);

@@ -17,7 +17,7 @@ enum class Pairing {
              ///< points, either way, and their means over neighbourhoods
 };
 
-/// The stages of a registration, in their order.
+/// In their order. Before kRefine, kRigid gives it a second start and kNonRigid is not run.
 enum class Stage { kRigid, kNonRigid, kRefine };
 
 /// What a point of the intra-operative cloud is.

@@ -101,8 +101,8 @@ class FlowModule : public Modules {
   FlowModule(const Weights& weights, Workspace& workspace)
       : workspace_(workspace), weights_(weights) {}
 
-  RigidStep rigidStep(const Points& moved, const Points& target, bool first, bool last) override {
-    if (last) {
+  RigidStep rigidStep(const Points& moved, const Points& target, bool first, bool fine) override {
+    if (fine) {
       fine_.setClouds(moved, target);
       return followed(fine_, kFlowFineSteps);
     }

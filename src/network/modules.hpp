@@ -16,9 +16,9 @@ class Modules {
  public:
   virtual ~Modules() = default;
 
-  /// A rigid iteration from where the source has been moved. `first`: of these clouds; `last`: none
-  /// follows.
-  virtual RigidStep rigidStep(const Points& moved, const Points& target, bool first, bool last) = 0;
+  /// A rigid iteration from where the source has been moved. `first`: of these clouds; `fine`: by
+  /// smaller steps of all points, where the kind has such, as the last iteration is.
+  virtual RigidStep rigidStep(const Points& moved, const Points& target, bool first, bool fine) = 0;
 
   /// Writes the displacements of `queries`, whose size they have, given the rigidly moved source.
   virtual void displace(const Points& source, const Points& target, const Points& queries,

@@ -46,12 +46,47 @@ struct Network::Implementation {
                                                       : makePublishedModules(*weights, workspace)) {
   }
 
+  Eigen::Isometry3f iterate(const Points& source, const Points& target, bool finely,
+                            std::vector<Eigen::Isometry3f>* iterates);
+
   std::shared_ptr<const Weights> weights;
   int rigid_iterations;
   Workspace workspace;
   std::unique_ptr<Modules> modules;
   Points moved;
 };
+
+/// Ends with a last iteration that is fine, or with the last coarse one.
+Eigen::Isometry3f Network::Implementation::iterate(const Points& source, const Points& target,
+                                                   bool finely,
+                                                   std::vector<Eigen::Isometry3f>* iterates) {
+  requireCloud(source, "source");
+  requireCloud(target, "target");
+  moved = source;
+  Eigen::Quaternionf rotation = Eigen::Quaternionf::Identity();
+  Eigen::Isometry3f transform = Eigen::Isometry3f::Identity();
+  const int after_converged = finely ? 1 : 0;
+  bool first = true;
+  for (int left = rigid_iterations; left > 0; first = false) {
+    const RigidStep step = modules->rigidStep(moved, target, first, finely && left == 1);
+    left = step.converged ? std::min(left - 1, after_converged) : left - 1;
+
+    // Apply the step
+    const Eigen::Matrix3f step_rotation = step.rotation.toRotationMatrix();
+    for (Eigen::Index column = 0; column < moved.cols(); ++column) {
+      moved.col(column) = (step_rotation * moved.col(column) + step.translation).eval();
+    }
+
+    // Compose, and keep the rotation a rotation
+    rotation = (step.rotation * rotation).normalized();
+    transform.translation() = step_rotation * transform.translation() + step.translation;
+    transform.linear() = rotation.toRotationMatrix();
+    if (iterates != nullptr) {
+      iterates->push_back(transform);
+    }
+  }
+  return transform;
+}
 
 Network::Network(std::shared_ptr<const Weights> weights, const NetworkSettings& settings,
                  int threads) {
@@ -65,33 +100,11 @@ Network& Network::operator=(Network&&) noexcept = default;
 
 Eigen::Isometry3f Network::estimateRigid(const Points& source, const Points& target,
                                          std::vector<Eigen::Isometry3f>* iterates) {
-  requireCloud(source, "source");
-  requireCloud(target, "target");
-  auto& network = *implementation_;
-  network.moved = source;
-  Eigen::Quaternionf rotation = Eigen::Quaternionf::Identity();
-  Eigen::Isometry3f transform = Eigen::Isometry3f::Identity();
-  bool first = true;
-  for (int left = network.rigid_iterations; left > 0; first = false) {
-    const RigidStep step = network.modules->rigidStep(network.moved, target, first, left == 1);
-    left = step.converged ? std::min(left - 1, 1) : left - 1;
+  return implementation_->iterate(source, target, true, iterates);
+}
 
-    // Apply the step
-    const Eigen::Matrix3f step_rotation = step.rotation.toRotationMatrix();
-    for (Eigen::Index column = 0; column < network.moved.cols(); ++column) {
-      network.moved.col(column) =
-          (step_rotation * network.moved.col(column) + step.translation).eval();
-    }
-
-    // Compose, and keep the rotation a rotation
-    rotation = (step.rotation * rotation).normalized();
-    transform.translation() = step_rotation * transform.translation() + step.translation;
-    transform.linear() = rotation.toRotationMatrix();
-    if (iterates != nullptr) {
-      iterates->push_back(transform);
-    }
-  }
-  return transform;
+Eigen::Isometry3f Network::estimateRigidCoarsely(const Points& source, const Points& target) {
+  return implementation_->iterate(source, target, false, nullptr);
 }
 
 Points Network::estimateDisplacements(const Points& source, const Points& target,

@@ -15,7 +15,7 @@ class PublishedModules : public Modules {
       : workspace_(workspace), pairing_(weights.pairing), weights_(weights) {}
 
   RigidStep rigidStep(const Points& moved, const Points& target, bool first,
-                      bool /*last*/) override {
+                      bool /*fine*/) override {
     float* features = rigid_features_.data();
     rigid_source_.encode(rowsOf(moved), features, workspace_);
     // The target's feature stands still

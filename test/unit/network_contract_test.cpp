@@ -137,6 +137,21 @@ TEST(NetworkContract, theFlowEndsWithAFineIterationOnceACoarseOneHardlyMoves) {
   EXPECT_EQ(iterationsOf(8), 8U);
 }
 
+TEST(NetworkContract, coarselyIsAllButTheFineIterationAndOfThePublishedLayersAll) {
+  const Points source = randomPoints(40, 1), target = randomPoints(40, 2);
+  for (const Pairing pairing : {Pairing::kOffsets, Pairing::kNearest}) {
+    const auto weights = loudWeights(pairing);
+    std::vector<Eigen::Isometry3f> iterates;
+    Network(weights, {3, pairing}, 1).estimateRigid(source, target, &iterates);
+    ASSERT_EQ(iterates.size(), 3U);
+    const int coarse_ones = pairing == Pairing::kOffsets ? 2 : 3;
+    const auto coarse =
+        Network(weights, {coarse_ones, pairing}, 1).estimateRigidCoarsely(source, target);
+    EXPECT_EQ(coarse.matrix(), iterates[coarse_ones - 1].matrix()) << toString(pairing);
+    EXPECT_NE(coarse.matrix(), iterates[0].matrix()) << toString(pairing);
+  }
+}
+
 TEST(NetworkContract, aTargetThatIsMirroredIsNotReachedByAReflection) {
   auto weights = std::make_shared<Weights>(randomWeights(Pairing::kOffsets, 1));
   Layer& last = weights->layers.at("flow.decoder.3");

@@ -39,6 +39,10 @@ class Network {
   Eigen::Isometry3f estimateRigid(const Points& source, const Points& target,
                                   std::vector<Eigen::Isometry3f>* iterates = nullptr);
 
+  /// The same without the flow module's last, fine iteration: near enough for a search that goes on
+  /// from there, in a fraction of the time. The published layers have no such iteration.
+  Eigen::Isometry3f estimateRigidCoarsely(const Points& source, const Points& target);
+
   /// Non-rigid stage: displacement of each of `queries` (3 x Q) given the rigidly moved `source`
   /// and `target`. With pairing row, queries must be the source and of the target's size. Throws
   /// as estimateRigid does.
