@@ -10,9 +10,9 @@
 
 namespace unirit {
 
-/// Threads that share out the items of a loop. They sleep between loops and nobody waits for one
-/// that has not begun: on a busy machine OpenMP's threads, which spin, made two threads six times
-/// slower than one.
+/// Threads that share out the items of a loop. Between loops they yield for a moment, then sleep,
+/// and nobody waits for one that has not begun: on a busy machine OpenMP's threads, which spin,
+/// made two threads six times slower than one.
 class ThreadTeam {
  public:
   /// The caller is one of the `size` threads. Throws std::invalid_argument where size < 1.
