@@ -56,23 +56,21 @@ void ThreadTeam::run(long count, const Job& job) {
   takeItems(0, job);
 
   // Closed to workers that have not begun; those that have finish their item
-  std::unique_lock<std::mutex> lock(mutex_);
-  job_ = nullptr;
-  if (busy_workers_ > 0) {
-    lock.unlock();
-    yieldUntil([this] { return busy_workers_ == 0; });
-    lock.lock();
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    job_ = nullptr;
   }
-  idle_.wait(lock, [this] { return busy_workers_ == 0; });
+  const auto done = [this] { return busy_workers_ == 0; };
+  yieldUntil(done);
+  std::unique_lock<std::mutex> lock(mutex_);
+  idle_.wait(lock, done);
 }
 
 void ThreadTeam::serve(int thread) {
   unsigned long last_job = 0;
-  std::unique_lock<std::mutex> lock(mutex_);
   while (true) {
-    lock.unlock();
     yieldUntil([&] { return job_number_ != last_job; });
-    lock.lock();
+    std::unique_lock<std::mutex> lock(mutex_);
     wake_.wait(lock, [&] { return stopping_ || (job_ != nullptr && job_number_ != last_job); });
     if (stopping_) {
       return;

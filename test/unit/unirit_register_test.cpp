@@ -96,6 +96,8 @@ TEST_F(RegisterTool, RunsTheStagesThatItIsTold) {
   };
   ASSERT_EQ(run(kUsual), 0);
   EXPECT_TRUE(ran("rigid") && !ran("nonrigid") && ran("refine"));  // which displaces by itself
+  ASSERT_EQ(run(std::string(kUsual) + "--stages rigid,refine"), 0) << contents(at("stderr"));
+  EXPECT_TRUE(ran("rigid") && !ran("nonrigid") && ran("refine"));
   ASSERT_EQ(run(std::string(kUsual) + "--stages refine"), 0) << contents(at("stderr"));
   EXPECT_TRUE(!ran("rigid") && ran("refine"));
   ASSERT_EQ(run(std::string(kUsual) + "--stages rigid,nonrigid"), 0);
