@@ -41,10 +41,11 @@ class PairSet:
 
 def statistics(source, target, truth):
     """In the clouds' unit: RMS distance to the truth, mean nearest distances either way."""
-    squares = (target**2).sum(1)[:, None] + (truth**2).sum(1)[None] - 2.0 * target @ truth.T
-    distances = np.sqrt(np.maximum(squares, 0.0))
+    squares = target @ (-2.0 * truth.T)
+    squares += (target**2).sum(1)[:, None]
+    squares += (truth**2).sum(1)
     before = np.sqrt(((source - truth) ** 2).sum(1).mean())
-    return before, distances.min(1).mean(), distances.min(0).mean()
+    return before, *(np.sqrt(np.maximum(squares.min(axis), 0.0)).mean() for axis in (1, 0))
 
 
 def of_pair_set(pairs, protocol):
