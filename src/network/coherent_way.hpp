@@ -3,6 +3,7 @@
 
 #include <Eigen/Cholesky>
 
+#include "kernels.hpp"
 #include "unirit/point_cloud.hpp"
 
 namespace unirit {
@@ -13,6 +14,9 @@ namespace unirit {
 /// another, given n_j . v(p_j) = n_j . o_j with noise (Rasmussen & Williams 2006, eq. 2.23).
 class CoherentWay {
  public:
+  /// `kernels` must outlive it.
+  explicit CoherentWay(const Kernels& kernels) : kernels_(kernels) {}
+
   /// Points p, the offsets o to points of their planes and the normals n, [3, N] each; allocates
   /// nothing where the number stays. Throws std::runtime_error where rounding leaves no solution.
   void fit(const Points& points, const Points& offsets, const Points& normals);
@@ -26,9 +30,14 @@ class CoherentWay {
   }
 
  private:
+  void findGaussians(const Points& points);
+
+  const Kernels& kernels_;
   Points sources_;
   Eigen::Vector3f translation_, turn_;
-  Eigen::Matrix<float, 6, Eigen::Dynamic> wrenches_;  // n and p x n, of each
+  Eigen::Matrix<float, Eigen::Dynamic, 6> wrenches_;     // n and p x n, of each
+  Eigen::Matrix<float, Eigen::Dynamic, 3> coordinates_;  // of the points, in whole blocks
+  Eigen::MatrixXf gaussians_;                            // e^(-|p_i - p_j|^2 / 2 l^2)
   Eigen::MatrixXf covariance_;
   Eigen::LLT<Eigen::MatrixXf> factor_;
   Eigen::VectorXf gains_;

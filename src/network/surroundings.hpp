@@ -15,7 +15,7 @@ namespace unirit {
 /// grow to the largest clouds seen.
 class Surroundings {
  public:
-  explicit Surroundings(Workspace& workspace) : workspace_(workspace) {}
+  explicit Surroundings(Workspace& workspace) : workspace_(workspace), way_(workspace.kernels()) {}
 
   /// The first to be called; the normals of its surface are estimated. Points in the order of their
   /// coordinates spread over the surface those whose planes are fitted to.

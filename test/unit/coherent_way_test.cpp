@@ -37,7 +37,7 @@ class CoherentWayTest : public testing::Test {
   static float meanLength(const Points& vectors) { return vectors.colwise().norm().mean(); }
 
   Points points_ = reference::surfacePoints(kFlowPlanes, 1), normals_;
-  CoherentWay way_;
+  CoherentWay way_{selectKernels()};
 };
 
 TEST_F(CoherentWayTest, nothingMovesWhatLiesOnItsPlanes) {
