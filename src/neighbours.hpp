@@ -53,4 +53,14 @@ class Neighbours {
       tree_;
 };
 
+/// So many points are a sample's neighbourhood on a surface, itself among them.
+inline constexpr Eigen::Index kSurfaceNeighbours = 14;
+
+/// Column i: the points nearest to point i, itself among them, the farthest last; as many as there
+/// are where that is less than kSurfaceNeighbours.
+Eigen::MatrixXi nearestPoints(const Points& points);
+
+/// As in unirit/normals.hpp, from what nearestPoints found.
+Points outwardNormals(const Points& points, const Eigen::MatrixXi& nearest);
+
 }  // namespace unirit

@@ -16,20 +16,6 @@
 namespace unirit {
 namespace {
 
-constexpr Eigen::Index kNormalNeighbours = 14;  // the point itself among them
-
-/// Column i: the points nearest to point i, itself among them.
-Eigen::MatrixXi nearestPoints(const Points& points) {
-  const Neighbours neighbours(points);
-  Eigen::MatrixXi nearest(std::min<Eigen::Index>(kNormalNeighbours, points.cols()), points.cols());
-  for (Eigen::Index i = 0; i < points.cols(); ++i) {
-    const auto found = neighbours.find<kNormalNeighbours>(points.col(i));
-    std::transform(found.indices.begin(), found.indices.begin() + nearest.rows(),
-                   nearest.col(i).data(), [](std::size_t j) { return static_cast<int>(j); });
-  }
-  return nearest;
-}
-
 Points normalsAmong(const Eigen::MatrixXi& nearest, const Points& points) {
   Points normals(3, points.cols());
   Eigen::SelfAdjointEigenSolver<Eigen::Matrix3f> solver;
@@ -151,6 +137,17 @@ void requireSurface(const Points& points) {
 
 }  // namespace
 
+Eigen::MatrixXi nearestPoints(const Points& points) {
+  const Neighbours neighbours(points);
+  Eigen::MatrixXi nearest(std::min(kSurfaceNeighbours, points.cols()), points.cols());
+  for (Eigen::Index i = 0; i < points.cols(); ++i) {
+    const auto found = neighbours.find<kSurfaceNeighbours>(points.col(i));
+    std::transform(found.indices.begin(), found.indices.begin() + nearest.rows(),
+                   nearest.col(i).data(), [](std::size_t j) { return static_cast<int>(j); });
+  }
+  return nearest;
+}
+
 Points estimateNormals(const Points& points) {
   requireSurface(points);
   return normalsAmong(nearestPoints(points), points);
@@ -161,8 +158,11 @@ void orientOutwards(const Points& points, Points& normals) {
 }
 
 Points outwardNormals(const Points& points) {
+  return outwardNormals(points, nearestPoints(points));
+}
+
+Points outwardNormals(const Points& points, const Eigen::MatrixXi& nearest) {
   requireSurface(points);
-  const Eigen::MatrixXi nearest = nearestPoints(points);
   Points normals = normalsAmong(nearest, points);
   orientAmong(nearest, points, normals);
   return normals;

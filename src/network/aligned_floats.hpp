@@ -12,7 +12,12 @@ class AlignedFloats {
  public:
   AlignedFloats() = default;
   explicit AlignedFloats(std::size_t size)
-      : values_(new (std::align_val_t{kAlignment}) float[size]()) {}
+      : values_(new (std::align_val_t{kAlignment}) float[size]()), size_(size) {}
+
+  /// At least so many from now on; zeros, and some more, where it must grow.
+  void reserve(std::size_t size) {
+    if (size > size_) *this = AlignedFloats(size + size / 4);
+  }
 
   float* data() { return values_.get(); }
   const float* data() const { return values_.get(); }
@@ -25,6 +30,7 @@ class AlignedFloats {
     }
   };
   std::unique_ptr<float[], Delete> values_;
+  std::size_t size_ = 0;
 };
 
 }  // namespace unirit

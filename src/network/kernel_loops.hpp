@@ -170,24 +170,23 @@ struct Loops {
     return underflows ? Vector{} : series * power;
   }
 
-  /// Affinities of one source point to the targets from j on; `sign` is that of the cosines.
+  /// Affinities of one source point to the targets from j on.
   static Vector affinity(const float* source, const OrientedPointsView& targets, long j,
-                         const AffinityView& view, Vector& sign) {
+                         const AffinityView& view) {
     const Vector dx = load(targets.position[0] + j) - source[0];
     const Vector dy = load(targets.position[1] + j) - source[1];
     const Vector dz = load(targets.position[2] + j) - source[2];
     const Vector closeness = exponential(view.exponent * (dx * dx + dy * dy + dz * dz));
-    const Vector one = 1.0F - Vector{};
-    sign = one;
     if (view.normals == NormalUse::kNone) return closeness;
     const Vector cosine = load(targets.normal[0] + j) * source[3] +
                           load(targets.normal[1] + j) * source[4] +
                           load(targets.normal[2] + j) * source[5];
-    sign = cosine < 0.0F ? -one : one;
-    const Vector both_sides = closeness * cosine * cosine;
-    if (view.normals == NormalUse::kUnsigned) return both_sides;
-    return cosine > 0.0F ? both_sides : Vector{};
+    const Vector same_side = cosine > 0.0F ? closeness * cosine * cosine : Vector{};
+    if (view.normals == NormalUse::kSigned) return same_side;
+    return cosine < 0.0F ? -closeness * cosine * cosine : same_side;
   }
+
+  static Vector absolute(const Vector& vector) { return vector < 0.0F ? -vector : vector; }
 
   static float sum(const Vector& vector) {
     float lanes[Lanes];
@@ -198,33 +197,35 @@ struct Loops {
   }
 
   static float affinities(const float* source, const OrientedPointsView& targets, const int* blocks,
-                          long block_count, const AffinityView& view, float* target_sums) {
+                          long block_count, const AffinityView& view, float* affinities,
+                          float* target_sums) {
     Vector total{};
     for (long b = 0; b < block_count; ++b) {
       for (long j = blocks[b] * kPointBlock; j < (blocks[b] + 1) * kPointBlock; j += Lanes) {
-        Vector sign;
-        const Vector value = affinity(source, targets, j, view, sign);
-        store(load(target_sums + j) + value, target_sums + j);
-        total += value;
+        const Vector value = affinity(source, targets, j, view);
+        store(value, affinities);
+        store(load(target_sums + j) + absolute(value), target_sums + j);
+        total += absolute(value);
+        affinities += Lanes;
       }
     }
     return sum(total);
   }
 
-  static void gather(const float* source, const OrientedPointsView& targets, const int* blocks,
-                     long block_count, const AffinityView& view, const float* target_weights,
-                     float source_weight, float* sums) {
+  static void gather(const float* affinities, const OrientedPointsView& targets, const int* blocks,
+                     long block_count, const float* target_weights, float source_weight,
+                     float* sums) {
     Vector totals[7] = {};
     for (long b = 0; b < block_count; ++b) {
       for (long j = blocks[b] * kPointBlock; j < (blocks[b] + 1) * kPointBlock; j += Lanes) {
-        Vector sign;
-        const Vector weight =
-            affinity(source, targets, j, view, sign) * (load(target_weights + j) + source_weight);
+        const Vector turned = load(affinities) * (load(target_weights + j) + source_weight);
+        const Vector weight = absolute(turned);
         totals[0] += weight;
         for (int axis = 0; axis < 3; ++axis) {
           totals[1 + axis] += weight * load(targets.position[axis] + j);
-          totals[4 + axis] += weight * sign * load(targets.normal[axis] + j);
+          totals[4 + axis] += turned * load(targets.normal[axis] + j);
         }
+        affinities += Lanes;
       }
     }
     for (int k = 0; k < 7; ++k) sums[k] = sum(totals[k]);

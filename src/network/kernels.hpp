@@ -73,16 +73,18 @@ struct Kernels {
   void (*nearest)(const float* queries, long query_count, const float* targets, long target_count,
                   int* indices);
 
-  /// Of one source point (position, normal) to the blocks of targets named: adds each affinity to
-  /// its target's sum and returns the sum over the targets.
+  /// Affinities of one source point (position, normal) to the targets of the blocks named, block
+  /// after block, negative where the normals look to opposite sides. Adds the size of each to its
+  /// target's sum and returns the sum over the targets.
   float (*affinities)(const float* source, const OrientedPointsView& targets, const int* blocks,
-                      long block_count, const AffinityView& affinity, float* target_sums);
+                      long block_count, const AffinityView& view, float* affinities,
+                      float* target_sums);
 
   /// sums = { sum of w, of w * position, of w * normal } over the targets of the blocks, where w is
-  /// the affinity times (target weight + source weight); normals are turned to the source's side.
-  void (*gather)(const float* source, const OrientedPointsView& targets, const int* blocks,
-                 long block_count, const AffinityView& affinity, const float* target_weights,
-                 float source_weight, float* sums);
+  /// the affinity's size times (target weight + source weight); normals are turned to the source's
+  /// side.
+  void (*gather)(const float* affinities, const OrientedPointsView& targets, const int* blocks,
+                 long block_count, const float* target_weights, float source_weight, float* sums);
 
   /// values[q][j] = e^(exponent * squared distance of query q to target j). Queries are x y z, ...,
   /// targets one coordinate an array, in whole blocks of kPointBlock.

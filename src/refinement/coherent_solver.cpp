@@ -11,9 +11,10 @@ namespace {
 
 constexpr long kProductRows = 12;  // rows multiplied by one thread at a time: a register tile
 constexpr Eigen::Index kPose = 6;  // rotation vector, translation
-/// Rows and columns of a symmetric 3 x 3 matrix's six entries.
+/// Rows and columns of a symmetric 3 x 3 matrix's six entries; which entry stands where.
 constexpr std::array<std::pair<int, int>, 6> kEntries{
     {{0, 0}, {0, 1}, {0, 2}, {1, 1}, {1, 2}, {2, 2}}};
+constexpr int kEntryAt[3][3] = {{0, 1, 2}, {1, 3, 4}, {2, 4, 5}};
 
 Eigen::Vector3f rotationVector(const Eigen::Matrix3f& rotation) {
   const Eigen::AngleAxisf angle_axis(rotation);
@@ -44,41 +45,56 @@ CoherentSolver::CoherentSolver(const Points& source, const Eigen::MatrixXf& func
       unknowns_(3 * rank() + kPose),
       factor_(3 * rank() + kPose) {}
 
-/// Each point's information matrix in the source's frame, and the parts of the normal equations
-/// that hold the pose. Residuals count from the reference, pose columns from where points lie now.
+/// Each point's information matrix and gradient, and the parts of the normal equations that hold
+/// the pose. Residuals count from the reference, pose columns from where points lie now.
 void CoherentSolver::weigh(const Correspondences& correspondences, const Trust& trust,
-                           const CoherentState& state, const Points& reference) {
+                           const CoherentState& state, const PointRows<3>& reference) {
   const Eigen::Matrix3f to_source = state.pose.linear().transpose();
   const Eigen::Vector3f shift = to_source * state.pose.translation();
   const float along = 1.0F / (trust.along * trust.along);
   const float across = 1.0F / (trust.across * trust.across);
-  pose_matrix_.setZero();
-  pose_gradient_.setZero();
-  for (Eigen::Index i = 0; i < source_.cols(); ++i) {
-    const Eigen::Vector3f normal = to_source * correspondences.normals.col(i);
-    const float weight = trust.weight * std::min(correspondences.mass[i], 1.0F);
-    Eigen::Matrix3f information = weight * (along - across) * normal * normal.transpose();
-    information.diagonal().array() += weight * across;
-    for (std::size_t entry = 0; entry < kEntries.size(); ++entry) {
-      information_(static_cast<Eigen::Index>(entry), i) =
-          information(kEntries[entry].first, kEntries[entry].second);
-    }
-    const Eigen::Vector3f gradient =
-        information * (to_source * correspondences.positions.col(i) - shift - reference.col(i));
+  normals_.matrix() = to_source.lazyProduct(correspondences.normals);
+  residuals_.matrix() = to_source.lazyProduct(correspondences.positions);
+  residuals_ -= reference.colwise() + shift.array();
+  weights_ = trust.weight * correspondences.mass.array().min(1.0F);
+  for (int entry = 0; entry < 6; ++entry) {
+    const auto [row, column] = kEntries[static_cast<std::size_t>(entry)];
+    information_.row(entry) =
+        (along - across) * weights_ * normals_.row(row) * normals_.row(column);
+    if (row == column) information_.row(entry) += across * weights_;
+  }
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto information = [&](int column) { return information_.row(kEntryAt[axis][column]); };
+    rows_.row(gradientRow(axis)).array() = information(0) * residuals_.row(0) +
+                                           information(1) * residuals_.row(1) +
+                                           information(2) * residuals_.row(2);
+  }
+  weighPose();
+}
 
-    // The pose moves a point by rotation x point + translation
-    const Eigen::Vector3f moved = moved_.col(i);
-    Eigen::Matrix<float, 3, kPose> columns;
-    columns << 0.0F, moved.z(), -moved.y(), 1.0F, 0.0F, 0.0F,  //
-        -moved.z(), 0.0F, moved.x(), 0.0F, 1.0F, 0.0F,         //
-        moved.y(), -moved.x(), 0.0F, 0.0F, 0.0F, 1.0F;
-    const Eigen::Matrix<float, 3, kPose> weighted = information * columns;
-    pose_matrix_.noalias() += columns.transpose() * weighted;
-    pose_gradient_.noalias() += columns.transpose() * gradient;
+/// The pose moves a point by rotation x point + translation.
+void CoherentSolver::weighPose() {
+  const auto moment = [&](int axis, const auto& force) {
+    const int next = (axis + 1) % 3, last = (axis + 2) % 3;
+    return moved_.row(next) * force(last) - moved_.row(last) * force(next);
+  };
+  const auto gradient = [&](int axis) { return rows_.row(gradientRow(axis)).array(); };
+  for (int i = 0; i < 3; ++i) {
+    const auto information = [&](int axis) { return information_.row(kEntryAt[i][axis]); };
     for (int axis = 0; axis < 3; ++axis) {
-      rows_.col(i).segment<kPose>(6 * rank() + axis * kPose) = weighted.row(axis).transpose();
+      rows_.row(poseRow(i, axis)) = moment(axis, information);
+      rows_.row(poseRow(i, 3 + axis)) = information(axis);
     }
-    rows_.col(i).tail<3>() = gradient;
+  }
+  for (int i = 0; i < 3; ++i) {
+    const auto column = [&](int axis) { return rows_.row(poseRow(axis, i)).array(); };
+    for (int axis = 0; axis < 3; ++axis) {
+      pose_matrix_(axis, i) = moment(axis, column).sum();
+      pose_matrix_(3 + axis, i) = pose_matrix_(i, 3 + axis) = column(axis).sum();
+      pose_matrix_(3 + axis, 3 + i) = information_.row(kEntryAt[i][axis]).sum();
+    }
+    pose_gradient_[i] = moment(i, gradient).sum();
+    pose_gradient_[3 + i] = gradient(i).sum();
   }
 }
 
@@ -86,7 +102,7 @@ void CoherentSolver::weigh(const Correspondences& correspondences, const Trust& 
 void CoherentSolver::multiply() {
   team_.forEach(6, [&](int, long entry) {
     rows_.middleRows(entry * rank(), rank()) =
-        functions_.array().rowwise() * information_.row(entry).array();
+        functions_.array().rowwise() * information_.row(entry);
   });
   const long items = (rows_.rows() + kProductRows - 1) / kProductRows;
   team_.forEach(items, [&](int, long item) {
@@ -106,8 +122,8 @@ void CoherentSolver::assemble() {
         products_.block(static_cast<Eigen::Index>(entry) * r, 0, r, r);
   }
   for (int axis = 0; axis < 3; ++axis) {
-    matrix_.block(3 * r, axis * r, kPose, r) = products_.block(6 * r + axis * kPose, 0, kPose, r);
-    unknowns_.segment(axis * r, r) = products_.row(6 * r + 3 * kPose + axis).head(r).transpose();
+    matrix_.block(3 * r, axis * r, kPose, r) = products_.block(poseRow(axis, 0), 0, kPose, r);
+    unknowns_.segment(axis * r, r) = products_.row(gradientRow(axis)).head(r).transpose();
   }
   matrix_.diagonal().head(3 * r).array() += 1.0F;  // the prior's coefficients are standard normal
   matrix_.bottomRightCorner<kPose, kPose>() = pose_matrix_;
@@ -149,7 +165,7 @@ void CoherentSolver::learnDeviations(const CoherentState& state) {
 
 void CoherentSolver::solvePose(const Correspondences& correspondences, const Trust& trust,
                                CoherentState& state) {
-  moved_ = source_ + state.displacements;
+  moved_ = source_ + state.displacements.array();
   weigh(correspondences, trust, state, moved_);
   matrix_.topLeftCorner<kPose, kPose>() = pose_matrix_;
   unknowns_.head<kPose>() = pose_gradient_;
@@ -161,7 +177,7 @@ void CoherentSolver::solvePose(const Correspondences& correspondences, const Tru
 
 void CoherentSolver::solve(const Correspondences& correspondences, const Trust& trust,
                            CoherentState& state, float stride) {
-  moved_ = source_ + state.displacements;
+  moved_ = source_ + state.displacements.array();
   weigh(correspondences, trust, state, source_);
   multiply();
   assemble();
@@ -179,8 +195,14 @@ void CoherentSolver::solve(const Correspondences& correspondences, const Trust& 
   learnDeviations(state);
 }
 
-void CoherentSolver::displace(CoherentState& state) const {
-  state.displacements.noalias() = state.coefficients * functions_;
+void CoherentSolver::displace(CoherentState& state) {
+  displaced_.setZero(3, source_.cols());
+  for (Eigen::Index k = 0; k < rank(); ++k) {
+    for (int axis = 0; axis < 3; ++axis) {
+      displaced_.row(axis) += state.coefficients(axis, k) * functions_.row(k);
+    }
+  }
+  state.displacements = displaced_;
 }
 
 void CoherentSolver::covarianceFactor(Eigen::MatrixXf& factor) const {

@@ -48,7 +48,7 @@ class CoherentSolver {
              float stride = 1.0F);
 
   /// Makes the displacements those of the coefficients.
-  void displace(CoherentState& state) const;
+  void displace(CoherentState& state);
 
   /// Forgets what was learnt of the pose's deviations, begins anew from these.
   void restart(const PosePrior& prior) { prior_ = deviations_ = prior; }
@@ -59,16 +59,21 @@ class CoherentSolver {
 
  private:
   using RowMajor = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+  template <int Rows>
+  using PointRows = Eigen::Array<float, Rows, Eigen::Dynamic, Eigen::RowMajor>;
 
   void weigh(const Correspondences& correspondences, const Trust& trust, const CoherentState& state,
-             const Points& reference);
+             const PointRows<3>& reference);
+  void weighPose();
+  Eigen::Index poseRow(int axis, int column) const { return 6 * rank() + 6 * axis + column; }
+  Eigen::Index gradientRow(int axis) const { return 6 * rank() + 18 + axis; }
   void multiply();
   void assemble();
   void addPosePrior(const CoherentState& state, Eigen::Index first);
   void movePose(Eigen::Index first, CoherentState& state) const;
   void learnDeviations(const CoherentState& state);
 
-  Points source_;
+  PointRows<3> source_;
   RowMajor functions_;  // rank x N
   PosePrior prior_;
   PosePrior deviations_;  // as learnt
@@ -77,8 +82,12 @@ class CoherentSolver {
   DenseLayer product_;  // multiplies rows of N by the functions
   RowMajor rows_;       // (6 rank + 21) x N: weighted functions, weighted pose columns, gradient
   RowMajor products_;   // (6 rank + 21) x padded rank
-  Eigen::Matrix<float, 6, Eigen::Dynamic> information_;  // xx xy xz yy yz zz of each point
-  Points moved_;
+  PointRows<6> information_;  // xx xy xz yy yz zz of each point, in the source's frame
+  PointRows<3> moved_;
+  PointRows<3> normals_;
+  PointRows<3> residuals_;
+  PointRows<1> weights_;
+  Eigen::Matrix<float, 3, Eigen::Dynamic, Eigen::RowMajor> displaced_;
   Eigen::Matrix<float, 6, 6> pose_matrix_;
   Eigen::Matrix<float, 6, 1> pose_gradient_;
   Eigen::MatrixXf matrix_;  // normal equations

@@ -48,10 +48,8 @@ Eigen::Matrix<float, 6, 1> oriented(const PointCloud& cloud, Eigen::Index i) {
 void CorrespondenceEstimator::reserve(long target_count) {
   target_count_ = target_count;
   padded_ = (target_count + kPointBlock - 1) / kPointBlock * kPointBlock;
-  if (padded_ <= capacity_) return;
-  targets_ = AlignedFloats(static_cast<std::size_t>(6 * padded_));
-  target_weights_ = AlignedFloats(static_cast<std::size_t>(padded_));
-  capacity_ = padded_;
+  targets_.reserve(static_cast<std::size_t>(6 * padded_));
+  target_weights_.reserve(static_cast<std::size_t>(padded_));
 }
 
 void CorrespondenceEstimator::aimAt(const PointCloud& target) {
@@ -65,16 +63,7 @@ void CorrespondenceEstimator::aimAt(const PointCloud& target) {
     const Eigen::Matrix<float, 6, 1> point = oriented(target, order_[static_cast<std::size_t>(j)]);
     for (int k = 0; k < 6; ++k) row(k)[j] = point[k];
   }
-  blocks_.clear();
-  for (long first = 0; first < target_count_; first += kPointBlock) {
-    const long count = std::min(kPointBlock, target_count_ - first);
-    Eigen::Matrix<float, 3, Eigen::Dynamic, 0, 3, kPointBlock> members(3, count);
-    for (int axis = 0; axis < 3; ++axis) {
-      members.row(axis) = Eigen::Map<const Eigen::RowVectorXf>(row(axis) + first, count);
-    }
-    const Eigen::Vector3f centre = members.rowwise().mean();
-    blocks_.push_back({centre, (members.colwise() - centre).colwise().norm().maxCoeff()});
-  }
+  boundBlocks();
   const Eigen::Vector3f middle = centroid(target.points);
   Eigen::Matrix3f covariance = Eigen::Matrix3f::Zero();
   for (long j = 0; j < target_count_; ++j) {
@@ -84,6 +73,27 @@ void CorrespondenceEstimator::aimAt(const PointCloud& target) {
   covariance /= static_cast<float>(target_count_);
   covariance.diagonal().array() += kFlatVariance;
   volume_ = std::sqrt(kBoxVariance * kBoxVariance * kBoxVariance * covariance.determinant());
+}
+
+/// A ball around each block; some far away make up the number.
+void CorrespondenceEstimator::boundBlocks() {
+  const long count = padded_ / kPointBlock;
+  Balls far_away = Balls::Zero();
+  far_away.leftCols<3>() = kFarAway;
+  balls_.assign(static_cast<std::size_t>((count + kBallsAtOnce - 1) / kBallsAtOnce), far_away);
+  for (long b = 0; b < count; ++b) {
+    const long first = b * kPointBlock;
+    const long size = std::min(kPointBlock, target_count_ - first);
+    Eigen::Matrix<float, 3, Eigen::Dynamic, 0, 3, kPointBlock> members(3, size);
+    for (int axis = 0; axis < 3; ++axis) {
+      members.row(axis) = Eigen::Map<const Eigen::RowVectorXf>(row(axis) + first, size);
+    }
+    const Eigen::Vector3f centre = members.rowwise().mean();
+    const float radius = (members.colwise() - centre).colwise().norm().maxCoeff();
+    balls_[static_cast<std::size_t>(b / kBallsAtOnce)].row(b % kBallsAtOnce)
+        << centre.transpose().array(),
+        radius;
+  }
 }
 
 float* CorrespondenceEstimator::row(int index) { return targets_.data() + index * padded_; }
@@ -98,37 +108,52 @@ OrientedPointsView CorrespondenceEstimator::view() const {
 long CorrespondenceEstimator::findNearby(const Eigen::Vector3f& point, float reach,
                                          int* nearby) const {
   long count = 0;
-  for (std::size_t b = 0; b < blocks_.size(); ++b) {
-    const float far = reach + blocks_[b].radius;
-    nearby[count] = static_cast<int>(b);  // written over unless it is near: no branch to guess
-    count += (blocks_[b].centre - point).squaredNorm() > far * far ? 0 : 1;
+  int block = 0;
+  for (const Balls& balls : balls_) {
+    const Eigen::Array<float, kBallsAtOnce, 1> beyond =
+        (balls.col(0) - point.x()).square() + (balls.col(1) - point.y()).square() +
+        (balls.col(2) - point.z()).square() - (balls.col(3) + reach).square();
+    for (long b = 0; b < kBallsAtOnce; ++b) {
+      nearby[count] = block++;  // written over unless it is near: no branch to guess
+      count += beyond[b] > 0.0F ? 0 : 1;
+    }
   }
   return count;
 }
 
 int* CorrespondenceEstimator::nearbyOf(Eigen::Index source) {
-  return nearby_.data() + static_cast<std::size_t>(source) * blocks_.size();
+  return nearby_.data() + static_cast<std::size_t>(source) * balls_.size() * kBallsAtOnce;
 }
 
-/// Sums over the source for each target (into the target weights), over the target for each source.
-void CorrespondenceEstimator::sumAffinities(const PointCloud& source, float reach,
-                                            const AffinityView& affinity) {
+long& CorrespondenceEstimator::countOf(Eigen::Index source) {
+  return nearby_counts_[static_cast<std::size_t>(source)];
+}
+
+/// And the blocks that they reach, their sums over the source for each target (into the target
+/// weights), over the target for each source.
+void CorrespondenceEstimator::findAffinities(const PointCloud& source, float reach,
+                                             const AffinityView& affinity) {
   const long chunks = (source.size() + kChunk - 1) / kChunk;
-  if (chunks * padded_ > chunk_capacity_) {
-    chunk_capacity_ = chunks * padded_;
-    chunk_sums_ = AlignedFloats(static_cast<std::size_t>(chunk_capacity_));
-  }
+  chunk_sums_.reserve(static_cast<std::size_t>(chunks * padded_));
+  affinities_.resize(static_cast<std::size_t>(chunks));
   source_sums_.resize(static_cast<std::size_t>(source.size()));
   nearby_counts_.resize(static_cast<std::size_t>(source.size()));
-  nearby_.resize(nearby_counts_.size() * blocks_.size());
+  nearby_.resize(nearby_counts_.size() * balls_.size() * kBallsAtOnce);
   team_.forEach(chunks, [&](int, long chunk) {
+    const long first = chunk * kChunk, end = std::min(first + kChunk, source.size());
+    long blocks = 0;
+    for (long i = first; i < end; ++i) {
+      blocks += countOf(i) = findNearby(source.points.col(i), reach, nearbyOf(i));
+    }
+    AlignedFloats& affinities = affinities_[static_cast<std::size_t>(chunk)];
+    affinities.reserve(static_cast<std::size_t>(blocks * kPointBlock));
+    float* values = affinities.data();
     float* sums = chunk_sums_.data() + chunk * padded_;
     std::fill_n(sums, padded_, 0.0F);
-    for (long i = chunk * kChunk; i < std::min((chunk + 1) * kChunk, source.size()); ++i) {
-      const auto point = static_cast<std::size_t>(i);
-      nearby_counts_[point] = findNearby(source.points.col(i), reach, nearbyOf(i));
-      source_sums_[point] = kernels_.affinities(oriented(source, i).data(), view(), nearbyOf(i),
-                                                nearby_counts_[point], affinity, sums);
+    for (long i = first; i < end; ++i) {
+      source_sums_[static_cast<std::size_t>(i)] = kernels_.affinities(
+          oriented(source, i).data(), view(), nearbyOf(i), countOf(i), affinity, values, sums);
+      values += countOf(i) * kPointBlock;
     }
   });
   Eigen::Map<Eigen::ArrayXf> totals(target_weights_.data(), padded_);
@@ -159,7 +184,7 @@ void CorrespondenceEstimator::estimate(const PointCloud& source,
                                        Correspondences& correspondences) {
   const float reach = kReach * attraction.sigma;
   const AffinityView affinity{-0.5F / (attraction.sigma * attraction.sigma), attraction.normals};
-  sumAffinities(source, reach, affinity);
+  findAffinities(source, reach, affinity);
 
   // Responsibilities are affinities over their sums and a uniform background
   const float spread = 2.0F * static_cast<float>(M_PI) * attraction.sigma * attraction.sigma;
@@ -177,13 +202,14 @@ void CorrespondenceEstimator::estimate(const PointCloud& source,
   correspondences.normals.resize(3, source.size());
   const long chunks = (source.size() + kChunk - 1) / kChunk;
   team_.forEach(chunks, [&](int, long chunk) {
+    const float* values = affinities_[static_cast<std::size_t>(chunk)].data();
     for (long i = chunk * kChunk; i < std::min((chunk + 1) * kChunk, source.size()); ++i) {
-      const auto point = static_cast<std::size_t>(i);
-      const float source_weight =
-          (1.0F - target_share) * visibility[i] / (source_sums_[point] + source_background);
+      const float source_weight = (1.0F - target_share) * visibility[i] /
+                                  (source_sums_[static_cast<std::size_t>(i)] + source_background);
       Eigen::Matrix<float, 7, 1> sums;
-      kernels_.gather(oriented(source, i).data(), view(), nearbyOf(i), nearby_counts_[point],
-                      affinity, target_weights_.data(), source_weight, sums.data());
+      kernels_.gather(values, view(), nearbyOf(i), countOf(i), target_weights_.data(),
+                      source_weight, sums.data());
+      values += countOf(i) * kPointBlock;
       const bool any = sums[0] > 0.0F;
       correspondences.mass[i] = sums[0];
       correspondences.positions.col(i) =

@@ -30,8 +30,8 @@ struct Correspondences {
 
 /// Soft correspondences of a moving source with a target that stays: the expectation step of
 /// coherent point drift (Myronenko & Song 2010, eq. 7), with normals. Target points far from a
-/// source point, in units of sigma, are passed over block by block. Allocates only where source or
-/// target grow.
+/// source point, in units of sigma, are passed over block by block. Allocates only where source,
+/// target or what is near grow.
 class CorrespondenceEstimator {
  public:
   /// `kernels` and `team` must outlive it.
@@ -46,33 +46,32 @@ class CorrespondenceEstimator {
                 const Attraction& attraction, Correspondences& correspondences);
 
  private:
-  struct Block {
-    Eigen::Vector3f centre;
-    float radius;
-  };
+  static constexpr long kBallsAtOnce = 8;
+  using Balls = Eigen::Array<float, kBallsAtOnce, 4>;  // centre x, y, z and radius of each
 
   void reserve(long target_count);
+  void boundBlocks();
   long findNearby(const Eigen::Vector3f& point, float reach, int* nearby) const;
   int* nearbyOf(Eigen::Index source);
+  long& countOf(Eigen::Index source);
   double fit(const Eigen::RowVectorXf& visibility, float target_background,
              float source_background) const;
-  void sumAffinities(const PointCloud& source, float reach, const AffinityView& affinity);
+  void findAffinities(const PointCloud& source, float reach, const AffinityView& affinity);
   OrientedPointsView view() const;
   float* row(int index);
 
   const Kernels& kernels_;
   ThreadTeam& team_;
   long target_count_ = 0;
-  long padded_ = 0;  // to whole blocks
-  long capacity_ = 0;
-  AlignedFloats targets_;   // six rows: x, y, z, normal x, y, z
-  std::vector<int> order_;  // the target's points, sorted into blocks
-  float volume_ = 0.0F;     // of a box with the target's principal variances
-  std::vector<Block> blocks_;
-  std::vector<int> nearby_;  // blocks near each source point, one row a point
+  long padded_ = 0;           // to whole blocks
+  AlignedFloats targets_;     // six rows: x, y, z, normal x, y, z
+  std::vector<int> order_;    // the target's points, sorted into blocks
+  float volume_ = 0.0F;       // of a box with the target's principal variances
+  std::vector<Balls> balls_;  // around the blocks
+  std::vector<int> nearby_;   // blocks near each source point, one row a point
   std::vector<long> nearby_counts_;
-  AlignedFloats chunk_sums_;  // one row a chunk of source points
-  long chunk_capacity_ = 0;   // numbers in them
+  std::vector<AlignedFloats> affinities_;  // to the blocks near, one array a chunk of source points
+  AlignedFloats chunk_sums_;               // of the affinities to each target, one row a chunk
   AlignedFloats target_weights_;
   std::vector<float> source_sums_;
 };

@@ -11,8 +11,7 @@
 namespace unirit {
 namespace {
 
-constexpr std::size_t kDiscPoints = 14;  // the disc's centre among them
-constexpr Eigen::Index kDiscs = 256;     // enough for the median
+constexpr Eigen::Index kDiscs = 256;  // enough for the median
 // The mean normal of a surface seen from all sides is at most so long. The sides of thin lobes may
 // be mistaken for each other, so the area counts too: of training organs, whole and deformed, it is
 // 0.92 at least; of views of 40 %, outliers among them, 0.80 at most.
@@ -28,28 +27,32 @@ bool faces(const PointCloud& seen, const Eigen::Vector3f& viewpoint) {
   return seen.normals.cwiseProduct(rays).sum() > 0.0F;
 }
 
-}  // namespace
-
-double sampledArea(const Points& points) {
-  const Neighbours neighbours(points);
+/// What the discs cover that reach to each point's farthest neighbour.
+double sampledArea(const Points& points, const Eigen::MatrixXi& nearest) {
   const Eigen::Index step = std::max<Eigen::Index>(1, points.cols() / kDiscs);
   std::vector<float> squared_radii;
   squared_radii.reserve(static_cast<std::size_t>(points.cols() / step + 1));
   for (Eigen::Index i = 0; i < points.cols(); i += step) {
-    const auto nearest = neighbours.find<kDiscPoints>(points.col(i));
-    squared_radii.push_back(nearest.squared_distances[nearest.count - 1]);
+    const Eigen::Index farthest = nearest(nearest.rows() - 1, i);
+    squared_radii.push_back((points.col(farthest) - points.col(i)).squaredNorm());
   }
   const auto middle = squared_radii.begin() + static_cast<std::ptrdiff_t>(squared_radii.size() / 2);
   std::nth_element(squared_radii.begin(), middle, squared_radii.end());
-  return M_PI * static_cast<double>(*middle) * static_cast<double>(points.cols()) / kDiscPoints;
+  return M_PI * static_cast<double>(*middle) * static_cast<double>(points.cols()) /
+         kSurfaceNeighbours;
 }
+
+}  // namespace
+
+double sampledArea(const Points& points) { return sampledArea(points, nearestPoints(points)); }
 
 Sighting sightingOf(const PointCloud& target, double organ_area) {
   Sighting sighting;
-  sighting.seen = {target.points, outwardNormals(target.points)};
+  const Eigen::MatrixXi nearest = nearestPoints(target.points);
+  sighting.seen = {target.points, outwardNormals(target.points, nearest)};
   const PointCloud& seen = sighting.seen;
   const bool known = target.viewpoint && faces(seen, *target.viewpoint);
-  const double share = sampledArea(seen.points) / organ_area;
+  const double share = sampledArea(seen.points, nearest) / organ_area;
   const double most = kOpennessOverShare * (share - kLeastShare);
   sighting.whole =
       openness(seen.normals) < (known ? std::min(most, kWholeOpennessFromViewpoint) : most);

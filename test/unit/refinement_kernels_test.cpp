@@ -65,6 +65,15 @@ double expectedAffinity(Targets& targets, long j, const AffinityView& view, doub
 
 class RefinementKernel : public InstructionSetTest {
  protected:
+  /// Of kSource to the targets of kSomeBlocks; adds to the sums.
+  static float affinities(const Targets& targets, const AffinityView& view,
+                          std::vector<float>& values, std::vector<float>& sums) {
+    values.resize(kSomeBlocks.size() * kPointBlock);
+    return selectKernels().affinities(kSource, targets.view(), kSomeBlocks.data(),
+                                      static_cast<long>(kSomeBlocks.size()), view, values.data(),
+                                      sums.data());
+  }
+
   /// e^x as the kernels know it: the affinity of points at distance 1.
   static float exponential(float x) {
     Targets targets(kPointBlock);
@@ -73,9 +82,10 @@ class RefinementKernel : public InstructionSetTest {
     }
     const float origin[6] = {};
     const int block = 0;
-    float sums[kPointBlock] = {};
-    selectKernels().affinities(origin, targets.view(), &block, 1, {x, NormalUse::kNone}, sums);
-    for (const float sum : sums) EXPECT_EQ(sum, sums[0]) << "another lane";
+    float sums[kPointBlock] = {}, affinities[kPointBlock];
+    selectKernels().affinities(origin, targets.view(), &block, 1, {x, NormalUse::kNone}, affinities,
+                               sums);
+    for (const float affinity : affinities) EXPECT_EQ(affinity, sums[0]) << "another lane";
     return sums[0];
   }
 };
@@ -85,15 +95,16 @@ TEST_P(RefinementKernel, AffinitiesAreThoseOfDoublePrecision) {
   for (const NormalUse use : kNormalUses) {
     for (const float exponent : {-0.5F, -8.0F, -20.0F}) {
       const AffinityView view{exponent, use};
-      std::vector<float> sums(kTargets, 0.25F);
-      const float total =
-          selectKernels().affinities(kSource, targets.view(), kSomeBlocks.data(),
-                                     static_cast<long>(kSomeBlocks.size()), view, sums.data());
+      std::vector<float> values, sums(kTargets, 0.25F);
+      const float total = affinities(targets, view, values, sums);
       double expected_total = 0.0;
-      for (long j = 0; j < kTargets; ++j) {
+      for (std::size_t k = 0; k < values.size(); ++k) {
+        const long j =
+            kSomeBlocks[k / kPointBlock] * kPointBlock + static_cast<long>(k) % kPointBlock;
         double sign = 0.0;
-        const double expected = isNamed(j) ? expectedAffinity(targets, j, view, sign) : 0.0;
+        const double expected = expectedAffinity(targets, j, view, sign);
         expected_total += expected;
+        EXPECT_NEAR(static_cast<double>(values[k]), sign * expected, 1e-6) << "target " << j;
         EXPECT_NEAR(static_cast<double>(sums[static_cast<std::size_t>(j)]), 0.25 + expected, 1e-6)
             << "target " << j;
       }
@@ -104,15 +115,13 @@ TEST_P(RefinementKernel, AffinitiesAreThoseOfDoublePrecision) {
 
 TEST_P(RefinementKernel, TargetsOfOtherBlocksAreLeftAlone) {
   Targets targets(kTargets);
-  std::vector<float> sums(kTargets, 0.1F);
-  selectKernels().affinities(kSource, targets.view(), kSomeBlocks.data(),
-                             static_cast<long>(kSomeBlocks.size()), {-1.0F, NormalUse::kNone},
-                             sums.data());
+  std::vector<float> values, sums(kTargets, 0.1F);
+  affinities(targets, {-1.0F, NormalUse::kNone}, values, sums);
   for (long j = 0; j < kTargets; ++j) {
     EXPECT_EQ(sums[static_cast<std::size_t>(j)] == 0.1F, !isNamed(j)) << "target " << j;
   }
   EXPECT_EQ(selectKernels().affinities(kSource, targets.view(), nullptr, 0,
-                                       {-1.0F, NormalUse::kNone}, sums.data()),
+                                       {-1.0F, NormalUse::kNone}, nullptr, sums.data()),
             0.0F);
 }
 
@@ -124,10 +133,12 @@ TEST_P(RefinementKernel, GatheredSumsAreThoseOfDoublePrecision) {
   for (const NormalUse use : kNormalUses) {
     for (const float source_weight : {0.0F, 0.7F}) {
       const AffinityView view{-4.0F, use};
+      std::vector<float> values, target_sums(kTargets);
+      affinities(targets, view, values, target_sums);
       float sums[7];
-      selectKernels().gather(kSource, targets.view(), kSomeBlocks.data(),
-                             static_cast<long>(kSomeBlocks.size()), view, weights.data(),
-                             source_weight, sums);
+      selectKernels().gather(values.data(), targets.view(), kSomeBlocks.data(),
+                             static_cast<long>(kSomeBlocks.size()), weights.data(), source_weight,
+                             sums);
       double expected[7] = {};
       for (long j = 0; j < kTargets; ++j) {
         if (!isNamed(j)) continue;
@@ -179,8 +190,10 @@ TEST_P(RefinementKernel, NormalsOnTheOtherSideCountAsTheirUseSays) {
   const int block = 0;
   const std::vector<float> weights(kPointBlock, 1.0F);
   const auto gathered = [&](NormalUse use) {
-    std::vector<float> sums(7);
-    selectKernels().gather(kSource, targets.view(), &block, 1, {-1.0F, use}, weights.data(), 0.0F,
+    std::vector<float> values(kPointBlock), target_sums(kPointBlock), sums(7);
+    selectKernels().affinities(kSource, targets.view(), &block, 1, {-1.0F, use}, values.data(),
+                               target_sums.data());
+    selectKernels().gather(values.data(), targets.view(), &block, 1, weights.data(), 0.0F,
                            sums.data());
     return sums;
   };
