@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "neighbours.hpp"
+#include "network/kernels.hpp"
 #include "unirit/sampling.hpp"
 
 namespace unirit {
@@ -19,6 +20,7 @@ namespace {
 constexpr Eigen::Index kAsked = 10000;    // whose nearest is sought
 constexpr Eigen::Index kSurface = 60000;  // of the moved surface: fewer would lie farther away
 constexpr Eigen::Index kCloud = 20000;    // still many within any tolerance
+constexpr Eigen::Index kFew = 2048;       // looked at one by one, which is faster than a k-d tree
 
 template <class Row>
 std::vector<float> toVector(const Row& row) {
@@ -52,8 +54,16 @@ double rootMeanSquareDistance(const Points& a, const Points& b) {
 
 Eigen::RowVectorXf nearestDistances(const Points& from, const Points& to) {
   if (to.cols() == 0) throw std::invalid_argument("to: an empty cloud has no nearest point");
-  const Neighbours neighbours(to);
   Eigen::RowVectorXf distances(from.cols());
+  if (to.cols() <= kFew) {
+    std::vector<int> nearest(static_cast<std::size_t>(from.cols()));
+    selectKernels().nearest(from.data(), from.cols(), to.data(), to.cols(), nearest.data());
+    for (Eigen::Index i = 0; i < from.cols(); ++i) {
+      distances[i] = (to.col(nearest[static_cast<std::size_t>(i)]) - from.col(i)).norm();
+    }
+    return distances;
+  }
+  const Neighbours neighbours(to);
   for (Eigen::Index i = 0; i < from.cols(); ++i) {
     distances[i] = std::sqrt(neighbours.find<1>(from.col(i)).squared_distances[0]);
   }

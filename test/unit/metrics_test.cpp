@@ -30,12 +30,16 @@ TEST(RootMeanSquareDistance, RefusesCloudsOfDifferentOrNoSize) {
 }
 
 TEST(NearestDistances, AgreeWithAFullSearch) {
-  const Points from = test::bumpyEllipsoid(200, 1), to = test::bumpyEllipsoid(300, 2);
-  const Eigen::RowVectorXf distances = nearestDistances(from, to);
-  for (Eigen::Index i = 0; i < from.cols(); ++i) {
-    EXPECT_FLOAT_EQ(distances[i], (to.colwise() - from.col(i)).colwise().norm().minCoeff());
+  const Points from = test::bumpyEllipsoid(200, 1);
+  for (const Eigen::Index count : {300, 3000}) {
+    const Points to = test::bumpyEllipsoid(count, 2);
+    const Eigen::RowVectorXf distances = nearestDistances(from, to);
+    for (Eigen::Index i = 0; i < from.cols(); ++i) {
+      EXPECT_FLOAT_EQ(distances[i], (to.colwise() - from.col(i)).colwise().norm().minCoeff());
+    }
   }
   EXPECT_THROW(nearestDistances(from, Points(3, 0)), std::invalid_argument);
+  EXPECT_EQ(nearestDistances(Points(3, 0), from).size(), 0);
 }
 
 TEST(SurfaceResidual, MeasuresALiftedHalfOfAGrid) {
