@@ -181,12 +181,17 @@ struct Loops {
     const Vector cosine = load(targets.normal[0] + j) * source[3] +
                           load(targets.normal[1] + j) * source[4] +
                           load(targets.normal[2] + j) * source[5];
-    const Vector same_side = cosine > 0.0F ? closeness * cosine * cosine : Vector{};
-    if (view.normals == NormalUse::kSigned) return same_side;
-    return cosine < 0.0F ? -closeness * cosine * cosine : same_side;
+    if (view.normals == NormalUse::kUnsigned) return closeness * cosine * absolute(cosine);
+    return cosine > 0.0F ? closeness * cosine * cosine : Vector{};
   }
 
-  static Vector absolute(const Vector& vector) { return vector < 0.0F ? -vector : vector; }
+  static Vector absolute(Vector vector) {
+    IndexVector bits;
+    __builtin_memcpy(&bits, &vector, sizeof(bits));
+    bits &= 0x7FFFFFFF;
+    __builtin_memcpy(&vector, &bits, sizeof(bits));
+    return vector;
+  }
 
   static float sum(const Vector& vector) {
     float lanes[Lanes];
