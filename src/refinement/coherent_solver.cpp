@@ -100,15 +100,14 @@ void CoherentSolver::weighPose() {
 
 /// Every weighted row times every function: all inner products that the normal equations need.
 void CoherentSolver::multiply() {
-  team_.forEach(6, [&](int, long entry) {
-    rows_.middleRows(entry * rank(), rank()) =
-        functions_.array().rowwise() * information_.row(entry);
-  });
   const long items = (rows_.rows() + kProductRows - 1) / kProductRows;
   team_.forEach(items, [&](int, long item) {
-    const long first = item * kProductRows;
-    const RowsView input{rows_.data() + first * rows_.cols(), rows_.cols(),
-                         std::min(kProductRows, rows_.rows() - first)};
+    const long first = item * kProductRows, end = std::min(first + kProductRows, rows_.rows());
+    for (long row = first; row < std::min(end, 6 * rank()); ++row) {
+      rows_.row(row).array() =
+          functions_.row(row % rank()).array() * information_.row(row / rank());
+    }
+    const RowsView input{rows_.data() + first * rows_.cols(), rows_.cols(), end - first};
     kernels_.dense(product_.view(), input, 0, product_.view().panel_count,
                    products_.data() + first * products_.cols(), products_.cols());
   });
