@@ -98,6 +98,13 @@ void CoherentSolver::weighPose() {
   }
 }
 
+/// Of the products of these rows: a symmetric block is computed up to its diagonal.
+long CoherentSolver::panelsOf(long first, long end) const {
+  const long below = first % rank() + (end - first);
+  if (end > 6 * rank() || below > rank()) return product_.view().panel_count;
+  return (below + kernels_.panel_width - 1) / kernels_.panel_width;
+}
+
 /// Every weighted row times every function: all inner products that the normal equations need.
 void CoherentSolver::multiply() {
   const long items = (rows_.rows() + kProductRows - 1) / kProductRows;
@@ -108,7 +115,7 @@ void CoherentSolver::multiply() {
           functions_.row(row % rank()).array() * information_.row(row / rank());
     }
     const RowsView input{rows_.data() + first * rows_.cols(), rows_.cols(), end - first};
-    kernels_.dense(product_.view(), input, 0, product_.view().panel_count,
+    kernels_.dense(product_.view(), input, 0, panelsOf(first, end),
                    products_.data() + first * products_.cols(), products_.cols());
   });
 }
@@ -117,8 +124,10 @@ void CoherentSolver::assemble() {
   const Eigen::Index r = rank();
   for (std::size_t entry = 0; entry < kEntries.size(); ++entry) {
     const auto [row, column] = kEntries[entry];
-    matrix_.block(column * r, row * r, r, r) =
-        products_.block(static_cast<Eigen::Index>(entry) * r, 0, r, r);
+    const auto product = products_.block(static_cast<Eigen::Index>(entry) * r, 0, r, r);
+    auto block = matrix_.block(column * r, row * r, r, r);
+    block.triangularView<Eigen::Lower>() = product;
+    block.triangularView<Eigen::StrictlyUpper>() = product.transpose();
   }
   for (int axis = 0; axis < 3; ++axis) {
     matrix_.block(3 * r, axis * r, kPose, r) = products_.block(poseRow(axis, 0), 0, kPose, r);

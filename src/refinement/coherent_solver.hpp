@@ -67,6 +67,7 @@ class CoherentSolver {
   void weighPose();
   Eigen::Index poseRow(int axis, int column) const { return 6 * rank() + 6 * axis + column; }
   Eigen::Index gradientRow(int axis) const { return 6 * rank() + 18 + axis; }
+  long panelsOf(long first, long end) const;
   void multiply();
   void assemble();
   void addPosePrior(const CoherentState& state, Eigen::Index first);
