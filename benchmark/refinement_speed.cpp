@@ -85,7 +85,7 @@ Registration registerClouds(benchmark::State& state, const PointCloud& preoperat
     return registrar.registerClouds(preoperative, intraoperative, start, earlier);
   };
   const Registration first = registerFrom(Eigen::Isometry3d::Identity(), nullptr);
-  const Earlier earlier{first.T_intraoperative_preoperative, first.deformation};
+  const Earlier earlier{first.T_intraoperative_preoperative, first.deformation, first.next_fit};
   for (auto _ : state) {
     benchmark::DoNotOptimize(warm ? registerFrom(earlier.T_intraoperative_preoperative, &earlier)
                                   : registerFrom(Eigen::Isometry3d::Identity(), nullptr));

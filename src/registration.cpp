@@ -20,6 +20,7 @@ namespace {
 constexpr double kPoorFit = -5.4;
 constexpr double kClearlyBetterWhole = 0.2;
 constexpr double kClearlyBetterView = 0.5;  // any pose of a part of the organ fits almost as well
+constexpr double kClearlyWorse = 0.3;       // in a stream, than the view before
 
 PointCloud dropInvalid(const PointCloud& cloud) {
   if (cloud.points.allFinite()) return cloud;
@@ -62,6 +63,12 @@ double surprise(const Refined& refined) {
   return refined.coefficients.norm() / std::sqrt(std::max(learnt, 1.0));
 }
 
+/// What a refinement must reach to be the last.
+double sufficientFit(const Earlier* earlier) {
+  if (earlier == nullptr || !earlier->fit) return kPoorFit;
+  return std::min(kPoorFit, *earlier->fit - kClearlyWorse);
+}
+
 void keepBetter(const Refined& other, bool whole, Refined& refined) {
   const double margin = whole ? kClearlyBetterWhole : kClearlyBetterView;
   if (other.fit > refined.fit + margin) refined = other;
@@ -76,6 +83,7 @@ struct Registrar::Implementation {
     Points displacements;  // of the network, at every point of the organ
     Sighting sighting;
     std::optional<Refined> refined;  // takes the place of the displacements
+    std::optional<double> next_fit;
   };
 
   Implementation(std::shared_ptr<const Weights> new_weights,
@@ -152,7 +160,7 @@ Registrar::Implementation::Found Registrar::Implementation::searchByNetwork(
   return found;
 }
 
-/// From the start and, where that fits poorly, from where the network moves the organ rigidly.
+/// From the start and, where that does not suffice, from where the network moves the organ rigidly.
 /// Beginning from its displacement as well, or from its fine iteration, was not more accurate.
 Registrar::Implementation::Found Registrar::Implementation::searchByRefinement(
     const PointCloud& target, const Eigen::Isometry3d& guess, const Earlier* earlier,
@@ -162,8 +170,8 @@ Registrar::Implementation::Found Registrar::Implementation::searchByRefinement(
     found.sighting = model->refinement->sight(target);
     found.refined = refineFromStart(found.sighting, guess, earlier);
   });
-  const bool fits = found.refined->fit > kPoorFit;
-  if (settings.runs(Stage::kRigid) && !fits) {
+  const double sufficient = sufficientFit(earlier);
+  if (settings.runs(Stage::kRigid) && found.refined->fit < sufficient) {
     Eigen::Isometry3f start = Eigen::Isometry3f::Identity();
     timed("rigid", stages,
           [&] { start = network.estimateRigidCoarsely(model->sampled.points, target.points); });
@@ -172,6 +180,10 @@ Registrar::Implementation::Found Registrar::Implementation::searchByRefinement(
     });
   }
   found.rigid = found.refined->pose;
+  found.next_fit = found.refined->fit;
+  if (earlier != nullptr && earlier->fit && found.refined->fit > sufficient) {
+    found.next_fit = std::max(*found.next_fit, *earlier->fit);
+  }
   return found;
 }
 
@@ -182,6 +194,7 @@ void Registrar::Implementation::describe(const Found& found, const Eigen::Isomet
   const Eigen::Isometry3d pose = guess * model->toMetres(found.rigid);
   registration.T_intraoperative_preoperative = pose;
   registration.next_guess = guess * model->toMetres(beyondExpectation(found.rigid));
+  registration.next_fit = found.next_fit;
   registration.deformation = deformationOf(found, pose, guess.linear().cast<float>());
   const Deformation& deformation = *registration.deformation;
   registration.residual = surfaceResidual(deformation.movedSurface(), intraoperative.points,
@@ -215,7 +228,7 @@ Refined Registrar::Implementation::refineFrom(const Eigen::Isometry3f& start,
 }
 
 /// A short search from what was found earlier, if anything was; a whole one from the guess where
-/// nothing was or it fits poorly.
+/// nothing was or that does not suffice.
 Refined Registrar::Implementation::refineFromStart(const Sighting& sighting,
                                                    const Eigen::Isometry3d& guess,
                                                    const Earlier* earlier) {
@@ -226,7 +239,7 @@ Refined Registrar::Implementation::refineFromStart(const Sighting& sighting,
   const Eigen::Matrix3f to_organ = found.rigidTransform().linear().transpose().cast<float>();
   Refined refined = model->refinement->refine(
       sighting, {startOf(guess, earlier), to_organ * moved / model->normalisation.scale, true});
-  if (refined.fit < kPoorFit) keepBetter(afar(), sighting.whole, refined);
+  if (refined.fit < sufficientFit(earlier)) keepBetter(afar(), sighting.whole, refined);
   return refined;
 }
 

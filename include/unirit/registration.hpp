@@ -45,6 +45,9 @@ struct Registration {
   /// The guess for the next view of a stream: this one's, moved by what of the pose lies beyond the
   /// deviations that are expected of it. Followed further, errors would add up.
   Eigen::Isometry3d next_guess = Eigen::Isometry3d::Identity();
+  /// What the refinement's fit should be near in the next view of a stream: the best since the
+  /// organ was last searched for from afar.
+  std::optional<double> next_fit = std::nullopt;
   std::shared_ptr<const Deformation> deformation;  ///< null unless succeeded or refused
   SurfaceResidual residual;                        ///< moved surface against the cloud
   DisplacementStatistics displacement;             ///< non-rigid part over the organ
@@ -60,6 +63,7 @@ struct Registration {
 struct Earlier {
   Eigen::Isometry3d T_intraoperative_preoperative;  ///< to the present intra-operative frame
   std::shared_ptr<const Deformation> deformation;   ///< in its own one
+  std::optional<double> fit = std::nullopt;         ///< Registration::next_fit
 };
 
 /// Registers a pre-operative surface to an intra-operative cloud: the page a user of the library
@@ -72,9 +76,10 @@ class Registrar {
 
   /// `guess` takes the pre-operative frame to the intra-operative one. Clouds may have any number
   /// of points, in any order; points that are not finite are dropped. `earlier`: where the
-  /// refinement begins, which then is short; the pose is still expected about the guess, so that
-  /// errors do not add up over a stream of views. Never throws on bad clouds: the status and
-  /// sentence say what is wrong.
+  /// refinement begins, which then is short, and is followed by a whole one from the guess only
+  /// where the fit is poor and clearly worse than the earlier one's; the pose is still expected
+  /// about the guess, so that errors do not add up over a stream of views. Never throws on bad
+  /// clouds: the status and sentence say what is wrong.
   Registration registerClouds(const PointCloud& preoperative, const PointCloud& intraoperative,
                               const Eigen::Isometry3d& guess, const Earlier* earlier = nullptr);
 

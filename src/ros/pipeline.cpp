@@ -174,6 +174,7 @@ void Pipeline::attempt(const Job& job, const Attempt* accepted, ros::Time now, A
   attempt.T_fixed_preoperative =
       T_cloud_fixed.inverse() * registration.T_intraoperative_preoperative;
   attempt.T_fixed_expected = T_cloud_fixed.inverse() * registration.next_guess;
+  attempt.expected_fit = registration.next_fit;
 
   // A guess replaces the accepted pose, so a jump from there is what is wanted
   const PlausibilitySettings& thresholds = registrar_->settings().plausibility;
@@ -232,7 +233,8 @@ Pipeline::Start Pipeline::chooseStart(const Job& job,
   }
   if (accepted != nullptr) {
     return {names::kStartAccepted, T_cloud_fixed * accepted->T_fixed_expected,
-            Earlier{T_cloud_fixed * accepted->T_fixed_preoperative, accepted->deformation}};
+            Earlier{T_cloud_fixed * accepted->T_fixed_preoperative, accepted->deformation,
+                    accepted->expected_fit}};
   }
   if (settings_.initial_pose) return {names::kStartPose, T_cloud_fixed * *settings_.initial_pose};
   if (settings_.initial_alignment == "none") {

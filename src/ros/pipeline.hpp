@@ -26,6 +26,7 @@ struct Attempt {
   Eigen::Isometry3d T_fixed_preoperative = Eigen::Isometry3d::Identity();
   /// Where the next attempt expects it: Registration::next_guess.
   Eigen::Isometry3d T_fixed_expected = Eigen::Isometry3d::Identity();
+  std::optional<double> expected_fit;  ///< Registration::next_fit
 };
 
 /// From a job to an attempt: checks the messages, looks up frames, chooses the start, makes the

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include <gtest/gtest.h>
 
+#include <optional>
+
 #include "lenient_limits.hpp"
 #include "unirit/evaluation/pair.hpp"
 #include "unirit/registration.hpp"
@@ -28,7 +30,8 @@ class Stream {
     return registrar_.registerClouds(organ_, {view.target, {}, view.viewpoint}, guess);
   }
   Registration next(const RegistrationPair& view, const Registration& before) {
-    const Earlier earlier{before.T_intraoperative_preoperative, before.deformation};
+    const Earlier earlier{before.T_intraoperative_preoperative, before.deformation,
+                          before.next_fit};
     return next(view, &earlier);
   }
 
@@ -122,14 +125,44 @@ TEST(WarmStart, ExpectsTheNextViewWhereTheGuessWasUnlessThatWasFarOff) {
   EXPECT_LT(next.translation().norm(), 0.7 * far.translation().norm());
 }
 
+/// A displacement that is none of this organ's.
+Registration elsewhere(Registration registration, const RegistrationPair& pair) {
+  registration.deformation = std::make_shared<const Deformation>(Eigen::Isometry3d::Identity(),
+                                                                 pair.source, 0.5F * pair.source);
+  return registration;
+}
+
 TEST(WarmStart, GivesWayToAWholeSearchWhereItFitsPoorly) {
   const RegistrationPair pair = pairOf("spleen", Protocol::kCaseB);
   Stream stream(pair, 1);
   const Registration cold = stream.next(pair);
-  Registration elsewhere = cold;  // a displacement that is none of this organ's
-  elsewhere.deformation = std::make_shared<const Deformation>(Eigen::Isometry3d::Identity(),
-                                                              pair.source, 0.5F * pair.source);
-  EXPECT_LT(errorOf(stream.next(pair, elsewhere), pair), 1.1 * errorOf(cold, pair));
+  Registration lost = elsewhere(cold, pair);
+  for (const std::optional<double> fit : {cold.next_fit, std::optional<double>()}) {
+    lost.next_fit = fit;
+    EXPECT_LT(errorOf(stream.next(pair, lost), pair), 1.1 * errorOf(cold, pair));
+  }
+}
+
+TEST(WarmStart, IsNotFollowedByASearchWhereItFitsAsTheViewBefore) {
+  const RegistrationPair pair = pairOf("spleen", Protocol::kCaseB);
+  Stream stream(pair, 1);
+  const Registration cold = stream.next(pair);
+  Registration poor = elsewhere(cold, pair);
+  poor.next_fit = -100.0;
+  EXPECT_GT(errorOf(stream.next(pair, poor), pair), 2.0 * errorOf(cold, pair));
+}
+
+TEST(WarmStart, HandsOnTheBestFitOfTheStream) {
+  const RegistrationPair pair = pairOf("kidney", Protocol::kPartial);
+  Stream stream(pair);
+  Registration before = stream.next(pair);
+  ASSERT_TRUE(before.refinement && before.next_fit);
+  EXPECT_EQ(*before.next_fit, before.refinement->fit);
+  before.next_fit = before.refinement->fit - 10.0;
+  const Registration better = stream.next(pair, before);
+  EXPECT_EQ(better.next_fit, better.refinement->fit);
+  before.next_fit = before.refinement->fit + 0.1;
+  EXPECT_EQ(stream.next(pair, before).next_fit, before.next_fit);
 }
 
 }  // namespace
