@@ -20,7 +20,7 @@ namespace {
 constexpr Eigen::Index kAsked = 10000;    // whose nearest is sought
 constexpr Eigen::Index kSurface = 60000;  // of the moved surface: fewer would lie farther away
 constexpr Eigen::Index kCloud = 20000;    // still many within any tolerance
-constexpr Eigen::Index kFew = 2048;       // looked at one by one, which is faster than a k-d tree
+constexpr Eigen::Index kFew = 1024;       // looked at one by one, which is faster than a k-d tree
 
 template <class Row>
 std::vector<float> toVector(const Row& row) {

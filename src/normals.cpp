@@ -158,11 +158,11 @@ void orientOutwards(const Points& points, Points& normals) {
 }
 
 Points outwardNormals(const Points& points) {
+  requireSurface(points);
   return outwardNormals(points, nearestPoints(points));
 }
 
 Points outwardNormals(const Points& points, const Eigen::MatrixXi& nearest) {
-  requireSurface(points);
   Points normals = normalsAmong(nearest, points);
   orientAmong(nearest, points, normals);
   return normals;

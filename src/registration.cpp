@@ -20,7 +20,7 @@ namespace {
 constexpr double kPoorFit = -5.4;
 constexpr double kClearlyBetterWhole = 0.2;
 constexpr double kClearlyBetterView = 0.5;  // any pose of a part of the organ fits almost as well
-constexpr double kClearlyWorse = 0.3;       // in a stream, than the view before
+constexpr double kClearlyWorse = 0.3;       // in a stream, than its best view
 
 PointCloud dropInvalid(const PointCloud& cloud) {
   if (cloud.points.allFinite()) return cloud;
@@ -69,9 +69,9 @@ double sufficientFit(const Earlier* earlier) {
   return std::min(kPoorFit, *earlier->fit - kClearlyWorse);
 }
 
-void keepBetter(const Refined& other, bool whole, Refined& refined) {
+void keepBetter(const Refined& other, bool whole, std::optional<Refined>& refined) {
   const double margin = whole ? kClearlyBetterWhole : kClearlyBetterView;
-  if (other.fit > refined.fit + margin) refined = other;
+  if (!refined || other.fit > refined->fit + margin) refined = other;
 }
 
 }  // namespace
@@ -104,8 +104,8 @@ struct Registrar::Implementation {
              const Earlier* earlier, Registration& registration);
 
   Refined refineFrom(const Eigen::Isometry3f& start, const Sighting& sighting);
-  Refined refineFromStart(const Sighting& sighting, const Eigen::Isometry3d& guess,
-                          const Earlier* earlier);
+  Refined refineFromEarlier(const Sighting& sighting, const Eigen::Isometry3d& guess,
+                            const Earlier& earlier);
   RefinementQuality qualityOf(const Found& found, const Deformation& deformation, bool cold);
   Eigen::Isometry3f startOf(const Eigen::Isometry3d& guess, const Earlier* earlier) const;
   std::shared_ptr<const Deformation> deformationOf(const Found& found,
@@ -160,30 +160,36 @@ Registrar::Implementation::Found Registrar::Implementation::searchByNetwork(
   return found;
 }
 
-/// From the start and, where that does not suffice, from where the network moves the organ rigidly.
-/// Beginning from its displacement as well, or from its fine iteration, was not more accurate.
+/// From what was found earlier, if anything was; where that does not suffice from the guess, and
+/// then from where the network moves the organ rigidly. Beginning from its displacement as well, or
+/// from its fine iteration, was not more accurate.
 Registrar::Implementation::Found Registrar::Implementation::searchByRefinement(
     const PointCloud& target, const Eigen::Isometry3d& guess, const Earlier* earlier,
     std::vector<StageTime>& stages) {
   Found found;
+  const auto suffices = [&] {
+    return found.refined && found.refined->fit >= sufficientFit(earlier);
+  };
+  const auto searchFrom = [&](const Eigen::Isometry3f& start) {
+    keepBetter(refineFrom(start, found.sighting), found.sighting.whole, found.refined);
+  };
+  bool searched = false;
   timed("refine", stages, [&] {
     found.sighting = model->refinement->sight(target);
-    found.refined = refineFromStart(found.sighting, guess, earlier);
+    if (earlier != nullptr) found.refined = refineFromEarlier(found.sighting, guess, *earlier);
+    searched = !suffices();
+    if (searched) searchFrom(Eigen::Isometry3f::Identity());
   });
-  const double sufficient = sufficientFit(earlier);
-  if (settings.runs(Stage::kRigid) && found.refined->fit < sufficient) {
+  if (settings.runs(Stage::kRigid) && !suffices()) {
     Eigen::Isometry3f start = Eigen::Isometry3f::Identity();
     timed("rigid", stages,
           [&] { start = network.estimateRigidCoarsely(model->sampled.points, target.points); });
-    timed("refine", stages, [&] {
-      keepBetter(refineFrom(start, found.sighting), found.sighting.whole, *found.refined);
-    });
+    timed("refine", stages, [&] { searchFrom(start); });
   }
   found.rigid = found.refined->pose;
-  found.next_fit = found.refined->fit;
-  if (earlier != nullptr && earlier->fit && found.refined->fit > sufficient) {
-    found.next_fit = std::max(*found.next_fit, *earlier->fit);
-  }
+  found.next_fit = searched
+                       ? found.refined->fit
+                       : std::max(found.refined->fit, earlier->fit.value_or(found.refined->fit));
   return found;
 }
 
@@ -227,20 +233,15 @@ Refined Registrar::Implementation::refineFrom(const Eigen::Isometry3f& start,
   return refined;
 }
 
-/// A short search from what was found earlier, if anything was; a whole one from the guess where
-/// nothing was or that does not suffice.
-Refined Registrar::Implementation::refineFromStart(const Sighting& sighting,
-                                                   const Eigen::Isometry3d& guess,
-                                                   const Earlier* earlier) {
-  const auto afar = [&] { return refineFrom(Eigen::Isometry3f::Identity(), sighting); };
-  if (earlier == nullptr) return afar();
-  const Deformation& found = *earlier->deformation;
+/// A short search.
+Refined Registrar::Implementation::refineFromEarlier(const Sighting& sighting,
+                                                     const Eigen::Isometry3d& guess,
+                                                     const Earlier& earlier) {
+  const Deformation& found = *earlier.deformation;
   const Points moved = found.move(model->samples) - found.moveRigidly(model->samples);
   const Eigen::Matrix3f to_organ = found.rigidTransform().linear().transpose().cast<float>();
-  Refined refined = model->refinement->refine(
-      sighting, {startOf(guess, earlier), to_organ * moved / model->normalisation.scale, true});
-  if (refined.fit < sufficientFit(earlier)) keepBetter(afar(), sighting.whole, refined);
-  return refined;
+  return model->refinement->refine(
+      sighting, {startOf(guess, &earlier), to_organ * moved / model->normalisation.scale, true});
 }
 
 RefinementQuality Registrar::Implementation::qualityOf(const Found& found,

@@ -63,7 +63,8 @@ struct Registration {
 struct Earlier {
   Eigen::Isometry3d T_intraoperative_preoperative;  ///< to the present intra-operative frame
   std::shared_ptr<const Deformation> deformation;   ///< in its own one
-  std::optional<double> fit = std::nullopt;         ///< Registration::next_fit
+  /// Registration::next_fit; where it is not known, a poor fit alone starts a whole search.
+  std::optional<double> fit = std::nullopt;
 };
 
 /// Registers a pre-operative surface to an intra-operative cloud: the page a user of the library

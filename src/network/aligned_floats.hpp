@@ -14,9 +14,12 @@ class AlignedFloats {
   explicit AlignedFloats(std::size_t size)
       : values_(new (std::align_val_t{kAlignment}) float[size]()), size_(size) {}
 
-  /// At least so many from now on; zeros, and some more, where it must grow.
-  void reserve(std::size_t size) {
-    if (size > size_) *this = AlignedFloats(size + size / 4);
+  /// At least so many from now on. Where it must grow there are some more, and all are zeros.
+  void ensure(std::size_t size) {
+    if (size <= size_) return;
+    size_ = 0;
+    values_.reset();  // not the old and the new at once
+    *this = AlignedFloats(size + size / 4);
   }
 
   float* data() { return values_.get(); }

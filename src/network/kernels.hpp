@@ -55,7 +55,7 @@ struct AffinityView {
   NormalUse normals;
 };
 
-/// The hot loops of network and refinement for one instruction set. Of the dense ones, an output is
+/// The hot loops for one instruction set. Of the dense ones, an output is
 /// the bias, then one multiply-add an input in their order: it depends on its own row alone, not on
 /// its neighbours or the blocking.
 struct Kernels {
@@ -74,15 +74,15 @@ struct Kernels {
                   int* indices);
 
   /// Affinities of one source point (position, normal) to the targets of the blocks named, block
-  /// after block, negative where the normals look to opposite sides. Adds the size of each to its
-  /// target's sum and returns the sum over the targets.
+  /// after block; of unsigned use, negative where the normals look to opposite sides. Adds the size
+  /// of each to its target's sum and returns the sum over the targets.
   float (*affinities)(const float* source, const OrientedPointsView& targets, const int* blocks,
                       long block_count, const AffinityView& view, float* affinities,
                       float* target_sums);
 
   /// sums = { sum of w, of w * position, of w * normal } over the targets of the blocks, where w is
-  /// the affinity's size times (target weight + source weight); normals are turned to the source's
-  /// side.
+  /// the affinity's size times (target weight + source weight); the normals of negative affinities
+  /// are reversed.
   void (*gather)(const float* affinities, const OrientedPointsView& targets, const int* blocks,
                  long block_count, const float* target_weights, float source_weight, float* sums);
 

@@ -10,7 +10,6 @@ namespace unirit {
 namespace {
 
 constexpr long kProductRows = 12;  // rows multiplied by one thread at a time: a register tile
-constexpr Eigen::Index kPose = 6;  // rotation vector, translation
 /// Rows and columns of a symmetric 3 x 3 matrix's six entries; which entry stands where.
 constexpr std::array<std::pair<int, int>, 6> kEntries{
     {{0, 0}, {0, 1}, {0, 2}, {1, 1}, {1, 2}, {2, 2}}};
@@ -38,7 +37,7 @@ CoherentSolver::CoherentSolver(const Points& source, const Eigen::MatrixXf& func
       kernels_(kernels),
       team_(team),
       product_(kernels, {functions, Eigen::VectorXf::Zero(functions.rows())}, Activation::kNone),
-      rows_(6 * rank() + 3 * kPose + 3, source.cols()),
+      rows_(gradientRow(3), source.cols()),
       products_(rows_.rows(), static_cast<Eigen::Index>(product_.paddedOutputs())),
       information_(6, source.cols()),
       matrix_(3 * rank() + kPose, 3 * rank() + kPose),

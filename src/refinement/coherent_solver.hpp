@@ -58,15 +58,17 @@ class CoherentSolver {
   void covarianceFactor(Eigen::MatrixXf& factor) const;
 
  private:
+  static constexpr Eigen::Index kPose = 6;  // rotation vector, translation
   using RowMajor = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+  /// A number of every point a row, for the processor's vectors.
   template <int Rows>
   using PointRows = Eigen::Array<float, Rows, Eigen::Dynamic, Eigen::RowMajor>;
 
   void weigh(const Correspondences& correspondences, const Trust& trust, const CoherentState& state,
              const PointRows<3>& reference);
   void weighPose();
-  Eigen::Index poseRow(int axis, int column) const { return 6 * rank() + 6 * axis + column; }
-  Eigen::Index gradientRow(int axis) const { return 6 * rank() + 18 + axis; }
+  Eigen::Index poseRow(int axis, int column) const { return 6 * rank() + kPose * axis + column; }
+  Eigen::Index gradientRow(int axis) const { return poseRow(3, axis); }
   long panelsOf(long first, long end) const;
   void multiply();
   void assemble();
@@ -85,12 +87,12 @@ class CoherentSolver {
   RowMajor products_;   // (6 rank + 21) x padded rank
   PointRows<6> information_;  // xx xy xz yy yz zz of each point, in the source's frame
   PointRows<3> moved_;
-  PointRows<3> normals_;
+  PointRows<3> normals_;  // in the source's frame, as the next
   PointRows<3> residuals_;
   PointRows<1> weights_;
   Eigen::Matrix<float, 3, Eigen::Dynamic, Eigen::RowMajor> displaced_;
-  Eigen::Matrix<float, 6, 6> pose_matrix_;
-  Eigen::Matrix<float, 6, 1> pose_gradient_;
+  Eigen::Matrix<float, kPose, kPose> pose_matrix_;
+  Eigen::Matrix<float, kPose, 1> pose_gradient_;
   Eigen::MatrixXf matrix_;  // normal equations
   Eigen::VectorXf unknowns_;
   Eigen::LLT<Eigen::MatrixXf> factor_;

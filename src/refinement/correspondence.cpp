@@ -48,8 +48,8 @@ Eigen::Matrix<float, 6, 1> oriented(const PointCloud& cloud, Eigen::Index i) {
 void CorrespondenceEstimator::reserve(long target_count) {
   target_count_ = target_count;
   padded_ = (target_count + kPointBlock - 1) / kPointBlock * kPointBlock;
-  targets_.reserve(static_cast<std::size_t>(6 * padded_));
-  target_weights_.reserve(static_cast<std::size_t>(padded_));
+  targets_.ensure(static_cast<std::size_t>(6 * padded_));
+  target_weights_.ensure(static_cast<std::size_t>(padded_));
 }
 
 void CorrespondenceEstimator::aimAt(const PointCloud& target) {
@@ -105,7 +105,7 @@ OrientedPointsView CorrespondenceEstimator::view() const {
 }
 
 /// Writes the blocks that reach near the point; how many.
-long CorrespondenceEstimator::findNearby(const Eigen::Vector3f& point, float reach,
+long CorrespondenceEstimator::blocksNear(const Eigen::Vector3f& point, float reach,
                                          int* nearby) const {
   long count = 0;
   int block = 0;
@@ -115,7 +115,7 @@ long CorrespondenceEstimator::findNearby(const Eigen::Vector3f& point, float rea
         (balls.col(2) - point.z()).square() - (balls.col(3) + reach).square();
     for (long b = 0; b < kBallsAtOnce; ++b) {
       nearby[count] = block++;  // written over unless it is near: no branch to guess
-      count += beyond[b] > 0.0F ? 0 : 1;
+      count += beyond[b] <= 0.0F ? 1 : 0;
     }
   }
   return count;
@@ -129,28 +129,39 @@ long& CorrespondenceEstimator::countOf(Eigen::Index source) {
   return nearby_counts_[static_cast<std::size_t>(source)];
 }
 
-/// And the blocks that they reach, their sums over the source for each target (into the target
-/// weights), over the target for each source.
-void CorrespondenceEstimator::findAffinities(const PointCloud& source, float reach,
-                                             const AffinityView& affinity) {
+/// The blocks of targets near each source point, and room for its affinities to them.
+void CorrespondenceEstimator::findNearby(const PointCloud& source, float reach) {
   const long chunks = (source.size() + kChunk - 1) / kChunk;
-  chunk_sums_.reserve(static_cast<std::size_t>(chunks * padded_));
-  affinities_.resize(static_cast<std::size_t>(chunks));
-  source_sums_.resize(static_cast<std::size_t>(source.size()));
   nearby_counts_.resize(static_cast<std::size_t>(source.size()));
   nearby_.resize(nearby_counts_.size() * balls_.size() * kBallsAtOnce);
   team_.forEach(chunks, [&](int, long chunk) {
-    const long first = chunk * kChunk, end = std::min(first + kChunk, source.size());
-    long blocks = 0;
-    for (long i = first; i < end; ++i) {
-      blocks += countOf(i) = findNearby(source.points.col(i), reach, nearbyOf(i));
+    for (long i = chunk * kChunk; i < std::min((chunk + 1) * kChunk, source.size()); ++i) {
+      countOf(i) = blocksNear(source.points.col(i), reach, nearbyOf(i));
     }
-    AlignedFloats& affinities = affinities_[static_cast<std::size_t>(chunk)];
-    affinities.reserve(static_cast<std::size_t>(blocks * kPointBlock));
-    float* values = affinities.data();
+  });
+  affinities_.resize(static_cast<std::size_t>(chunks));
+  for (long chunk = 0; chunk < chunks; ++chunk) {
+    long blocks = 0;
+    for (long i = chunk * kChunk; i < std::min((chunk + 1) * kChunk, source.size()); ++i) {
+      blocks += countOf(i);
+    }
+    affinities_[static_cast<std::size_t>(chunk)].ensure(
+        static_cast<std::size_t>(blocks * kPointBlock));
+  }
+}
+
+/// Affinities to what is near, and their sums: over the source for each target (into the target
+/// weights), over the target for each source.
+void CorrespondenceEstimator::findAffinities(const PointCloud& source,
+                                             const AffinityView& affinity) {
+  const long chunks = (source.size() + kChunk - 1) / kChunk;
+  chunk_sums_.ensure(static_cast<std::size_t>(chunks * padded_));
+  source_sums_.resize(static_cast<std::size_t>(source.size()));
+  team_.forEach(chunks, [&](int, long chunk) {
+    float* values = affinities_[static_cast<std::size_t>(chunk)].data();
     float* sums = chunk_sums_.data() + chunk * padded_;
     std::fill_n(sums, padded_, 0.0F);
-    for (long i = first; i < end; ++i) {
+    for (long i = chunk * kChunk; i < std::min((chunk + 1) * kChunk, source.size()); ++i) {
       source_sums_[static_cast<std::size_t>(i)] = kernels_.affinities(
           oriented(source, i).data(), view(), nearbyOf(i), countOf(i), affinity, values, sums);
       values += countOf(i) * kPointBlock;
@@ -182,9 +193,8 @@ void CorrespondenceEstimator::estimate(const PointCloud& source,
                                        const Eigen::RowVectorXf& visibility,
                                        const Attraction& attraction,
                                        Correspondences& correspondences) {
-  const float reach = kReach * attraction.sigma;
-  const AffinityView affinity{-0.5F / (attraction.sigma * attraction.sigma), attraction.normals};
-  findAffinities(source, reach, affinity);
+  findNearby(source, kReach * attraction.sigma);
+  findAffinities(source, {-0.5F / (attraction.sigma * attraction.sigma), attraction.normals});
 
   // Responsibilities are affinities over their sums and a uniform background
   const float spread = 2.0F * static_cast<float>(M_PI) * attraction.sigma * attraction.sigma;

@@ -51,12 +51,13 @@ class CorrespondenceEstimator {
 
   void reserve(long target_count);
   void boundBlocks();
-  long findNearby(const Eigen::Vector3f& point, float reach, int* nearby) const;
+  long blocksNear(const Eigen::Vector3f& point, float reach, int* nearby) const;
   int* nearbyOf(Eigen::Index source);
   long& countOf(Eigen::Index source);
   double fit(const Eigen::RowVectorXf& visibility, float target_background,
              float source_background) const;
-  void findAffinities(const PointCloud& source, float reach, const AffinityView& affinity);
+  void findNearby(const PointCloud& source, float reach);
+  void findAffinities(const PointCloud& source, const AffinityView& affinity);
   OrientedPointsView view() const;
   float* row(int index);
 

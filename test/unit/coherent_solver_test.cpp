@@ -3,6 +3,7 @@
 
 #include "allocation_counter.hpp"
 #include "coherent_reference.hpp"
+#include "instruction_set_test.hpp"
 #include "oriented_organ.hpp"
 #include "refinement/displacement_prior.hpp"
 
@@ -10,7 +11,7 @@ namespace unirit {
 namespace {
 
 constexpr Eigen::Index kPoints = 250;
-constexpr int kRank = 20;
+constexpr int kRank = 50;  // several panels of any instruction set, no whole number of tiles
 constexpr PosePrior kPrior{0.1F, 0.05F};
 constexpr Trust kTrust{0.05F, 0.2F, 0.3F};
 
@@ -21,7 +22,7 @@ Eigen::Isometry3f somePose(float angle = 0.15F) {
 }
 
 /// An organ whose points are seen, more or less surely, near where they lie.
-class CoherentSolving : public testing::Test {
+class CoherentSolving : public InstructionSetTest {
  protected:
   CoherentSolving()
       : organ_(test::orientedOrgan(kPoints, 1)),
@@ -82,7 +83,7 @@ class CoherentSolving : public testing::Test {
 const reference::Deviations kPriorDeviations{static_cast<double>(kPrior.rotation),
                                              static_cast<double>(kPrior.translation)};
 
-TEST_F(CoherentSolving, StepsSolveTheDenseLeastSquaresProblem) {
+TEST_P(CoherentSolving, StepsSolveTheDenseLeastSquaresProblem) {
   ThreadTeam team(2);
   CoherentSolver fast = solver(team);
   CoherentState state = start();
@@ -100,7 +101,7 @@ TEST_F(CoherentSolving, StepsSolveTheDenseLeastSquaresProblem) {
   EXPECT_GT(deviations.rotation, 1.2 * kPriorDeviations.rotation);  // 0.3 radian were to be found
 }
 
-TEST_F(CoherentSolving, AStrideGoesSoManyTimesAsFar) {
+TEST_P(CoherentSolving, AStrideGoesSoManyTimesAsFar) {
   ThreadTeam team(1);
   CoherentState once = start(), farther = start();
   const CoherentState before = start();
@@ -116,7 +117,7 @@ TEST_F(CoherentSolving, AStrideGoesSoManyTimesAsFar) {
               1.8F * Eigen::AngleAxisf(step.linear()).angle(), 1e-3F);
 }
 
-TEST_F(CoherentSolving, CovarianceIsThatOfTheDenseProblem) {
+TEST_P(CoherentSolving, CovarianceIsThatOfTheDenseProblem) {
   ThreadTeam team(2);
   CoherentSolver fast = solver(team);
   CoherentState state = start();
@@ -134,7 +135,7 @@ TEST_F(CoherentSolving, CovarianceIsThatOfTheDenseProblem) {
   EXPECT_LE(expected.diagonal().maxCoeff(), 1.0);  // from a prior of standard normals
 }
 
-TEST_F(CoherentSolving, UnseenOrgansAreLeftToThePrior) {
+TEST_P(CoherentSolving, UnseenOrgansAreLeftToThePrior) {
   ThreadTeam team(1);
   CoherentSolver fast = solver(team);
   CoherentState state = start();
@@ -147,7 +148,7 @@ TEST_F(CoherentSolving, UnseenOrgansAreLeftToThePrior) {
   EXPECT_TRUE((factor.transpose() * factor).isIdentity(1e-4F));
 }
 
-TEST_F(CoherentSolving, PoseAloneIsFoundWhereTheMotionIsRigid) {
+TEST_P(CoherentSolving, PoseAloneIsFoundWhereTheMotionIsRigid) {
   ThreadTeam team(1);
   CoherentSolver fast = solver(team, {10.0F, 10.0F});
   CoherentState state = start(Eigen::Isometry3f::Identity());
@@ -159,7 +160,7 @@ TEST_F(CoherentSolving, PoseAloneIsFoundWhereTheMotionIsRigid) {
   EXPECT_EQ(state.displacements, Points::Zero(3, kPoints));
 }
 
-TEST_F(CoherentSolving, PoseAloneTakesTheDisplacementsAsTheyAre) {
+TEST_P(CoherentSolving, PoseAloneTakesTheDisplacementsAsTheyAre) {
   ThreadTeam team(1);
   CoherentSolver fast = solver(team, {10.0F, 10.0F});
   CoherentState state = start(Eigen::Isometry3f::Identity());
@@ -170,7 +171,7 @@ TEST_F(CoherentSolving, PoseAloneTakesTheDisplacementsAsTheyAre) {
   EXPECT_EQ(state.displacements, before);
 }
 
-TEST_F(CoherentSolving, PosePriorPullsToTheStart) {
+TEST_P(CoherentSolving, PosePriorPullsToTheStart) {
   ThreadTeam team(1);
   const auto found = [&](float deviation) {
     CoherentSolver fast = solver(team, {deviation, deviation});
@@ -187,7 +188,7 @@ TEST_F(CoherentSolving, PosePriorPullsToTheStart) {
   EXPECT_LT(found(0.0001F).translation().norm(), 0.001F);
 }
 
-TEST_F(CoherentSolving, RestartForgetsAndThreadsDoNotMatter) {
+TEST_P(CoherentSolving, RestartForgetsAndThreadsDoNotMatter) {
   CoherentState first;
   for (const int threads : {1, 2, 3}) {
     ThreadTeam team(threads);
@@ -210,10 +211,13 @@ TEST_F(CoherentSolving, RestartForgetsAndThreadsDoNotMatter) {
 
 class CoherentSolvingAllocation : public CoherentSolving {
  protected:
-  void SetUp() override { test::requireCounting(); }
+  void SetUp() override {
+    CoherentSolving::SetUp();
+    test::requireCounting();
+  }
 };
 
-TEST_F(CoherentSolvingAllocation, StepsAllocateNothingAfterTheFirst) {
+TEST_P(CoherentSolvingAllocation, StepsAllocateNothingAfterTheFirst) {
   for (const int threads : {1, 2}) {
     ThreadTeam team(threads);
     CoherentSolver fast = solver(team);
@@ -226,6 +230,9 @@ TEST_F(CoherentSolvingAllocation, StepsAllocateNothingAfterTheFirst) {
     EXPECT_EQ(test::countAllocations(step), 0) << threads << " threads";
   }
 }
+
+UNIRIT_ON_EVERY_INSTRUCTION_SET(CoherentSolving);
+UNIRIT_ON_EVERY_INSTRUCTION_SET(CoherentSolvingAllocation);
 
 }  // namespace
 }  // namespace unirit

@@ -7,13 +7,14 @@
 #include <limits>
 #include <stdexcept>
 
+#include "instruction_set_test.hpp"
 #include "network_reference.hpp"
 
 namespace unirit {
 namespace {
 
 /// An ellipsoid's points and normals.
-class CoherentWayTest : public testing::Test {
+class CoherentWayTest : public InstructionSetTest {
  protected:
   CoherentWayTest() {
     const Eigen::Vector3f curvature(4.0F, 8.0F, 16.0F);  // inverse squared half axes
@@ -40,12 +41,12 @@ class CoherentWayTest : public testing::Test {
   CoherentWay way_{selectKernels()};
 };
 
-TEST_F(CoherentWayTest, nothingMovesWhatLiesOnItsPlanes) {
+TEST_P(CoherentWayTest, nothingMovesWhatLiesOnItsPlanes) {
   way_.fit(points_, Points::Zero(3, points_.cols()), normals_);
   EXPECT_EQ(meanLength(ways(points_)), 0.0F);
 }
 
-TEST_F(CoherentWayTest, findsARigidMotionFromWaysAlongNormalsAlone) {
+TEST_P(CoherentWayTest, findsARigidMotionFromWaysAlongNormalsAlone) {
   const Eigen::Vector3f turn(0.1F, -0.05F, 0.08F), shift(0.05F, 0.1F, -0.08F);
   Points motion(3, points_.cols()), along_normals = motion;
   for (Eigen::Index j = 0; j < points_.cols(); ++j) {
@@ -57,7 +58,7 @@ TEST_F(CoherentWayTest, findsARigidMotionFromWaysAlongNormalsAlone) {
   EXPECT_GT(meanLength(along_normals - motion), 0.5F * meanLength(motion));
 }
 
-TEST_F(CoherentWayTest, findsASmoothDeformationOfPointsNotGivenToIt) {
+TEST_P(CoherentWayTest, findsASmoothDeformationOfPointsNotGivenToIt) {
   const auto bend = [](const Points& points) {
     Points bent = Points::Zero(3, points.cols());
     bent.row(2) = 0.5F * points.row(0).cwiseAbs2();
@@ -68,7 +69,7 @@ TEST_F(CoherentWayTest, findsASmoothDeformationOfPointsNotGivenToIt) {
   EXPECT_LT(meanLength(ways(others) - bend(others)), 0.5F * meanLength(bend(others)));
 }
 
-TEST_F(CoherentWayTest, trustsFarOffsetsLess) {
+TEST_P(CoherentWayTest, trustsFarOffsetsLess) {
   const Points up = Eigen::Vector3f::UnitZ() * Eigen::RowVectorXf::Ones(points_.cols());
   way_.fit(points_, 0.05F * up, normals_);
   const float near = meanLength(ways(points_)) / 0.05F;
@@ -77,7 +78,7 @@ TEST_F(CoherentWayTest, trustsFarOffsetsLess) {
   EXPECT_LT(meanLength(ways(points_)) / 20.0F, 0.7F * near);
 }
 
-TEST_F(CoherentWayTest, onePlaneAndManyInOnePlaceAreFitted) {
+TEST_P(CoherentWayTest, onePlaneAndManyInOnePlaceAreFitted) {
   const Points one = points_.leftCols(1), normal = normals_.leftCols(1);
   way_.fit(one, 0.1F * normal, normal);
   const Eigen::Vector3f alone = way_.rigid(one.col(0)) + way_.sources().col(0);
@@ -90,7 +91,7 @@ TEST_F(CoherentWayTest, onePlaneAndManyInOnePlaceAreFitted) {
               0.01F);
 }
 
-TEST_F(CoherentWayTest, roundingLeavesASolutionOfCloudsFarOutOfTheUnit) {
+TEST_P(CoherentWayTest, roundingLeavesASolutionOfCloudsFarOutOfTheUnit) {
   for (const float scale : {1e-3F, 1e3F, 1e6F}) {
     way_.fit(scale * points_, scale * 0.1F * normals_, normals_);
     EXPECT_TRUE(way_.sources().allFinite()) << scale;
@@ -98,7 +99,7 @@ TEST_F(CoherentWayTest, roundingLeavesASolutionOfCloudsFarOutOfTheUnit) {
   }
 }
 
-TEST_F(CoherentWayTest, whatIsNotFiniteComesOutOrIsRefused) {
+TEST_P(CoherentWayTest, whatIsNotFiniteComesOutOrIsRefused) {
   Points offsets = Points::Zero(3, points_.cols());
   offsets(1, 7) = std::numeric_limits<float>::quiet_NaN();
   try {
@@ -107,6 +108,8 @@ TEST_F(CoherentWayTest, whatIsNotFiniteComesOutOrIsRefused) {
   } catch (const std::runtime_error&) {
   }
 }
+
+UNIRIT_ON_EVERY_INSTRUCTION_SET(CoherentWayTest);
 
 }  // namespace
 }  // namespace unirit

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "refinement/correspondence.hpp"
 
+#include <limits>
+
 #include "allocation_counter.hpp"
 #include "correspondence_reference.hpp"
 #include "oriented_organ.hpp"
@@ -57,6 +59,15 @@ void expectNear(const Correspondences& found, const reference::Expected& wanted,
 /// So wide that every point reaches every other: nothing is cut off.
 Attraction wide(NormalUse normals = NormalUse::kSigned, float symmetry = 4.0F) {
   return {0.7F, 0.1F, normals, symmetry};
+}
+
+TEST(CorrespondencesOfBrokenClouds, WhatIsNotANumberIsNearNothing) {
+  PointCloud moving = source();
+  moving.points.col(3).setConstant(std::numeric_limits<float>::quiet_NaN());
+  const Correspondences found = estimated(moving, target(130), wide());  // no whole number of balls
+  EXPECT_EQ(found.mass[3], 0.0F);
+  EXPECT_TRUE(found.mass.allFinite());
+  EXPECT_GT(found.mass[4], 0.0F);
 }
 
 TEST(Correspondence, AreThoseOfDoublePrecision) {

@@ -149,7 +149,9 @@ TEST(OutwardNormals, AreThoseEstimatedAndTurnedOutwards) {
   Points normals = estimateNormals(organ.points);
   orientOutwards(organ.points, normals);
   EXPECT_EQ(outwardNormals(organ.points), normals);
-  EXPECT_THROW(outwardNormals(Points::Zero(3, 2)), std::invalid_argument);
+  for (const int count : {0, 1, 2}) {
+    EXPECT_THROW(outwardNormals(Points::Zero(3, count)), std::invalid_argument) << count;
+  }
 }
 
 TEST(OrientTowards, TurnsToTheViewpointWhatLooksAwayAndNothingElse) {

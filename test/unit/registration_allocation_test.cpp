@@ -34,7 +34,7 @@ class RegistrationAllocation : public testing::Test {
     Registration registration;
     const auto registerClouds = [&] {
       const Eigen::Isometry3d start = registration.T_intraoperative_preoperative;
-      const Earlier earlier{start, registration.deformation};
+      const Earlier earlier{start, registration.deformation, registration.next_fit};
       registration = registrar.registerClouds(organ_, seen_, start,
                                               warm && earlier.deformation ? &earlier : nullptr);
     };

@@ -152,6 +152,23 @@ TEST(WarmStart, IsNotFollowedByASearchWhereItFitsAsTheViewBefore) {
   EXPECT_GT(errorOf(stream.next(pair, poor), pair), 2.0 * errorOf(cold, pair));
 }
 
+TEST(WarmStart, ExpectsNoMoreThanAWholeSearchFound) {
+  const RegistrationPair pair = pairOf("spleen", Protocol::kCaseB);
+  Stream stream(pair, 1);
+  const Registration cold = stream.next(pair);
+  Registration lost = elsewhere(cold, pair);
+  lost.next_fit = 0.0;  // better than any
+  const Registration found = stream.next(pair, lost);
+  EXPECT_LT(*found.next_fit, 0.0);
+  EXPECT_EQ(found.next_fit, found.refinement->fit);
+
+  RegistrationPair scattered = pair;  // which nothing fits
+  scattered.target = extent(pair.source) / 2.0F * Points::Random(3, 1024);
+  const Registration poor = stream.next(scattered, cold);
+  EXPECT_LT(*poor.next_fit, *cold.next_fit - 1.0);
+  EXPECT_EQ(poor.next_fit, poor.refinement->fit);
+}
+
 TEST(WarmStart, HandsOnTheBestFitOfTheStream) {
   const RegistrationPair pair = pairOf("kidney", Protocol::kPartial);
   Stream stream(pair);
