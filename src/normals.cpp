@@ -2,7 +2,6 @@
 #include "unirit/normals.hpp"
 
 #include <Eigen/Eigenvalues>
-#include <algorithm>
 #include <cmath>
 #include <numeric>
 #include <queue>
@@ -136,17 +135,6 @@ void requireSurface(const Points& points) {
 }
 
 }  // namespace
-
-Eigen::MatrixXi nearestPoints(const Points& points) {
-  const Neighbours neighbours(points);
-  Eigen::MatrixXi nearest(std::min(kSurfaceNeighbours, points.cols()), points.cols());
-  for (Eigen::Index i = 0; i < points.cols(); ++i) {
-    const auto found = neighbours.find<kSurfaceNeighbours>(points.col(i));
-    std::transform(found.indices.begin(), found.indices.begin() + nearest.rows(),
-                   nearest.col(i).data(), [](std::size_t j) { return static_cast<int>(j); });
-  }
-  return nearest;
-}
 
 Points estimateNormals(const Points& points) {
   requireSurface(points);
