@@ -58,7 +58,7 @@ void CoherentWay::fit(const Points& points, const Points& offsets, const Points&
 /// Of every two points.
 void CoherentWay::findGaussians(const Points& points) {
   const Eigen::Index count = points.cols();
-  const Eigen::Index padded = (count + kPointBlock - 1) / kPointBlock * kPointBlock;
+  const Eigen::Index padded = inWholeBlocks(count);
   coordinates_.setZero(padded, 3);
   coordinates_.topRows(count) = points.transpose();
   gaussians_.resize(padded, count);

@@ -37,6 +37,11 @@ struct OrientedPointsView {
 /// Points that a kernel takes together, for every instruction set the same.
 inline constexpr long kPointBlock = 16;
 
+/// Room for so many points in whole blocks.
+constexpr long inWholeBlocks(long count) {
+  return (count + kPointBlock - 1) / kPointBlock * kPointBlock;
+}
+
 /// Neighbourhoods of a point, each half the size of the one before, and what is averaged over them.
 inline constexpr int kNeighbourhoods = 4;
 inline constexpr int kAveraged = 23;

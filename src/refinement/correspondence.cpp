@@ -10,11 +10,21 @@ namespace unirit {
 namespace {
 
 constexpr float kReach = 4.0F;           // affinities beyond so many sigma are below 4e-4
-constexpr long kChunk = 64;              // source points to a chunk, whatever the number of threads
 constexpr float kFarAway = 1e6F;         // where the padding lies
 constexpr float kSourceOutliers = 0.1F;  // background of the source's side over the target's
 constexpr float kBoxVariance = 12.0F;    // side^2 over variance of a uniformly filled box
 constexpr float kFlatVariance = 1e-4F;   // no target is flatter
+
+/// The source points that a thread takes together, whatever the number of threads.
+struct Chunk {
+  static constexpr long kPoints = 64;
+  static long count(const PointCloud& source) { return (source.size() + kPoints - 1) / kPoints; }
+
+  Chunk(long index, const PointCloud& source)
+      : begin(index * kPoints), end(std::min(begin + kPoints, source.size())) {}
+
+  long begin, end;
+};
 
 /// Sorts indices so that every kPointBlock of them lie close together: halves along the longest
 /// side until a block is left.
@@ -47,7 +57,7 @@ Eigen::Matrix<float, 6, 1> oriented(const PointCloud& cloud, Eigen::Index i) {
 
 void CorrespondenceEstimator::reserve(long target_count) {
   target_count_ = target_count;
-  padded_ = (target_count + kPointBlock - 1) / kPointBlock * kPointBlock;
+  padded_ = inWholeBlocks(target_count);
   targets_.ensure(static_cast<std::size_t>(6 * padded_));
   target_weights_.ensure(static_cast<std::size_t>(padded_));
 }
@@ -131,21 +141,23 @@ long& CorrespondenceEstimator::countOf(Eigen::Index source) {
 
 /// The blocks of targets near each source point, and room for its affinities to them.
 void CorrespondenceEstimator::findNearby(const PointCloud& source, float reach) {
-  const long chunks = (source.size() + kChunk - 1) / kChunk;
+  const long chunks = Chunk::count(source);
   nearby_counts_.resize(static_cast<std::size_t>(source.size()));
   nearby_.resize(nearby_counts_.size() * balls_.size() * kBallsAtOnce);
-  team_.forEach(chunks, [&](int, long chunk) {
-    for (long i = chunk * kChunk; i < std::min((chunk + 1) * kChunk, source.size()); ++i) {
+  team_.forEach(chunks, [&](int, long index) {
+    const Chunk chunk(index, source);
+    for (long i = chunk.begin; i < chunk.end; ++i) {
       countOf(i) = blocksNear(source.points.col(i), reach, nearbyOf(i));
     }
   });
   affinities_.resize(static_cast<std::size_t>(chunks));
-  for (long chunk = 0; chunk < chunks; ++chunk) {
+  for (long index = 0; index < chunks; ++index) {
+    const Chunk chunk(index, source);
     long blocks = 0;
-    for (long i = chunk * kChunk; i < std::min((chunk + 1) * kChunk, source.size()); ++i) {
+    for (long i = chunk.begin; i < chunk.end; ++i) {
       blocks += countOf(i);
     }
-    affinities_[static_cast<std::size_t>(chunk)].ensure(
+    affinities_[static_cast<std::size_t>(index)].ensure(
         static_cast<std::size_t>(blocks * kPointBlock));
   }
 }
@@ -154,14 +166,15 @@ void CorrespondenceEstimator::findNearby(const PointCloud& source, float reach) 
 /// weights), over the target for each source.
 void CorrespondenceEstimator::findAffinities(const PointCloud& source,
                                              const AffinityView& affinity) {
-  const long chunks = (source.size() + kChunk - 1) / kChunk;
+  const long chunks = Chunk::count(source);
   chunk_sums_.ensure(static_cast<std::size_t>(chunks * padded_));
   source_sums_.resize(static_cast<std::size_t>(source.size()));
-  team_.forEach(chunks, [&](int, long chunk) {
-    float* values = affinities_[static_cast<std::size_t>(chunk)].data();
-    float* sums = chunk_sums_.data() + chunk * padded_;
+  team_.forEach(chunks, [&](int, long index) {
+    const Chunk chunk(index, source);
+    float* values = affinities_[static_cast<std::size_t>(index)].data();
+    float* sums = chunk_sums_.data() + index * padded_;
     std::fill_n(sums, padded_, 0.0F);
-    for (long i = chunk * kChunk; i < std::min((chunk + 1) * kChunk, source.size()); ++i) {
+    for (long i = chunk.begin; i < chunk.end; ++i) {
       source_sums_[static_cast<std::size_t>(i)] = kernels_.affinities(
           oriented(source, i).data(), view(), nearbyOf(i), countOf(i), affinity, values, sums);
       values += countOf(i) * kPointBlock;
@@ -210,10 +223,11 @@ void CorrespondenceEstimator::estimate(const PointCloud& source,
   correspondences.mass.resize(source.size());
   correspondences.positions.resize(3, source.size());
   correspondences.normals.resize(3, source.size());
-  const long chunks = (source.size() + kChunk - 1) / kChunk;
-  team_.forEach(chunks, [&](int, long chunk) {
-    const float* values = affinities_[static_cast<std::size_t>(chunk)].data();
-    for (long i = chunk * kChunk; i < std::min((chunk + 1) * kChunk, source.size()); ++i) {
+  const long chunks = Chunk::count(source);
+  team_.forEach(chunks, [&](int, long index) {
+    const Chunk chunk(index, source);
+    const float* values = affinities_[static_cast<std::size_t>(index)].data();
+    for (long i = chunk.begin; i < chunk.end; ++i) {
       const float source_weight = (1.0F - target_share) * visibility[i] /
                                   (source_sums_[static_cast<std::size_t>(i)] + source_background);
       Eigen::Matrix<float, 7, 1> sums;

@@ -23,7 +23,7 @@ DisplacementPrior::DisplacementPrior(const Points& surface, double length, doubl
       inducing_(select(surface, sampleEvenly(surface, kInducingPoints))),
       exponent_(static_cast<float>(-0.5 / (length * length))),
       variance_(static_cast<float>(amplitude * amplitude)),
-      padded_((inducing_.cols() + kPointBlock - 1) / kPointBlock * kPointBlock),
+      padded_(inWholeBlocks(inducing_.cols())),
       targets_(static_cast<std::size_t>(3 * padded_)) {
   const Eigen::Index count = inducing_.cols();
   std::fill_n(targets_.data(), 3 * padded_, kFarAway);

@@ -125,47 +125,45 @@ TEST(WarmStart, ExpectsTheNextViewWhereTheGuessWasUnlessThatWasFarOff) {
   EXPECT_LT(next.translation().norm(), 0.7 * far.translation().norm());
 }
 
-/// A displacement that is none of this organ's.
-Registration elsewhere(Registration registration, const RegistrationPair& pair) {
-  registration.deformation = std::make_shared<const Deformation>(Eigen::Isometry3d::Identity(),
-                                                                 pair.source, 0.5F * pair.source);
-  return registration;
-}
+/// A stream whose next view begins with a displacement that is none of this organ's.
+class LostWarmStart : public testing::Test {
+ protected:
+  LostWarmStart() {
+    lost_.deformation = std::make_shared<const Deformation>(Eigen::Isometry3d::Identity(),
+                                                            pair_.source, 0.5F * pair_.source);
+  }
 
-TEST(WarmStart, GivesWayToAWholeSearchWhereItFitsPoorly) {
-  const RegistrationPair pair = pairOf("spleen", Protocol::kCaseB);
-  Stream stream(pair, 1);
-  const Registration cold = stream.next(pair);
-  Registration lost = elsewhere(cold, pair);
-  for (const std::optional<double> fit : {cold.next_fit, std::optional<double>()}) {
-    lost.next_fit = fit;
-    EXPECT_LT(errorOf(stream.next(pair, lost), pair), 1.1 * errorOf(cold, pair));
+  /// Of the same view again.
+  Registration next(std::optional<double> expected_fit) {
+    lost_.next_fit = expected_fit;
+    return stream_.next(pair_, lost_);
+  }
+
+  const RegistrationPair pair_ = pairOf("spleen", Protocol::kCaseB);
+  Stream stream_{pair_, 1};
+  const Registration cold_ = stream_.next(pair_);
+  Registration lost_ = cold_;
+};
+
+TEST_F(LostWarmStart, GivesWayToAWholeSearchWhereItFitsPoorly) {
+  for (const std::optional<double> fit : {cold_.next_fit, std::optional<double>()}) {
+    EXPECT_LT(errorOf(next(fit), pair_), 1.1 * errorOf(cold_, pair_));
   }
 }
 
-TEST(WarmStart, IsNotFollowedByASearchWhereItFitsAsTheViewBefore) {
-  const RegistrationPair pair = pairOf("spleen", Protocol::kCaseB);
-  Stream stream(pair, 1);
-  const Registration cold = stream.next(pair);
-  Registration poor = elsewhere(cold, pair);
-  poor.next_fit = -100.0;
-  EXPECT_GT(errorOf(stream.next(pair, poor), pair), 2.0 * errorOf(cold, pair));
+TEST_F(LostWarmStart, IsNotFollowedByASearchWhereItFitsAsTheViewBefore) {
+  EXPECT_GT(errorOf(next(-100.0), pair_), 2.0 * errorOf(cold_, pair_));
 }
 
-TEST(WarmStart, ExpectsNoMoreThanAWholeSearchFound) {
-  const RegistrationPair pair = pairOf("spleen", Protocol::kCaseB);
-  Stream stream(pair, 1);
-  const Registration cold = stream.next(pair);
-  Registration lost = elsewhere(cold, pair);
-  lost.next_fit = 0.0;  // better than any
-  const Registration found = stream.next(pair, lost);
+TEST_F(LostWarmStart, ExpectsNoMoreThanAWholeSearchFound) {
+  const Registration found = next(0.0);  // better than any
   EXPECT_LT(*found.next_fit, 0.0);
   EXPECT_EQ(found.next_fit, found.refinement->fit);
 
-  RegistrationPair scattered = pair;  // which nothing fits
-  scattered.target = extent(pair.source) / 2.0F * Points::Random(3, 1024);
-  const Registration poor = stream.next(scattered, cold);
-  EXPECT_LT(*poor.next_fit, *cold.next_fit - 1.0);
+  RegistrationPair scattered = pair_;  // which nothing fits
+  scattered.target = extent(pair_.source) / 2.0F * Points::Random(3, 1024);
+  const Registration poor = stream_.next(scattered, cold_);
+  EXPECT_LT(*poor.next_fit, *cold_.next_fit - 1.0);
   EXPECT_EQ(poor.next_fit, poor.refinement->fit);
 }
 
