@@ -61,6 +61,7 @@ inline constexpr Eigen::Index kSurfaceNeighbours = 14;
 Eigen::MatrixXi nearestPoints(const Points& points);
 
 /// As in unirit/normals.hpp, from what nearestPoints found.
-Points outwardNormals(const Points& points, const Eigen::MatrixXi& nearest);
+Points estimateNormals(const Points& points, const Eigen::MatrixXi& nearest);
+void orientOutwards(const Points& points, const Eigen::MatrixXi& nearest, Points& normals);
 
 }  // namespace unirit

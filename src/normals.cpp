@@ -15,24 +15,6 @@
 namespace unirit {
 namespace {
 
-Points normalsAmong(const Eigen::MatrixXi& nearest, const Points& points) {
-  Points normals(3, points.cols());
-  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3f> solver;
-  for (Eigen::Index i = 0; i < points.cols(); ++i) {
-    Eigen::Vector3f sum = Eigen::Vector3f::Zero();
-    Eigen::Matrix3f scatter = Eigen::Matrix3f::Zero();
-    for (Eigen::Index k = 0; k < nearest.rows(); ++k) {
-      const Eigen::Vector3f offset = points.col(nearest(k, i)) - points.col(i);
-      sum += offset;
-      scatter += offset * offset.transpose();
-    }
-    scatter -= sum * sum.transpose() / static_cast<float>(nearest.rows());
-    solver.computeDirect(scatter);
-    normals.col(i) = solver.eigenvectors().col(0);
-  }
-  return normals;
-}
-
 /// Points joined to their nearest ones and to those whose nearest they are.
 class NeighbourGraph {
  public:
@@ -116,7 +98,36 @@ class Orientation {
   std::priority_queue<Edge> edges_;
 };
 
-void orientAmong(const Eigen::MatrixXi& nearest, const Points& points, Points& normals) {
+void requireSurface(const Points& points) {
+  if (points.cols() < 3) throw std::invalid_argument("points: three at least make a surface");
+}
+
+}  // namespace
+
+Points estimateNormals(const Points& points, const Eigen::MatrixXi& nearest) {
+  requireSurface(points);
+  Points normals(3, points.cols());
+  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3f> solver;
+  for (Eigen::Index i = 0; i < points.cols(); ++i) {
+    Eigen::Vector3f sum = Eigen::Vector3f::Zero();
+    Eigen::Matrix3f scatter = Eigen::Matrix3f::Zero();
+    for (Eigen::Index k = 0; k < nearest.rows(); ++k) {
+      const Eigen::Vector3f offset = points.col(nearest(k, i)) - points.col(i);
+      sum += offset;
+      scatter += offset * offset.transpose();
+    }
+    scatter -= sum * sum.transpose() / static_cast<float>(nearest.rows());
+    solver.computeDirect(scatter);
+    normals.col(i) = solver.eigenvectors().col(0);
+  }
+  return normals;
+}
+
+Points estimateNormals(const Points& points) {
+  return estimateNormals(points, nearestPoints(points));
+}
+
+void orientOutwards(const Points& points, const Eigen::MatrixXi& nearest, Points& normals) {
   const NeighbourGraph graph(nearest);
   const Eigen::Vector3f centre = centroid(points);
   Orientation orientation(graph, normals);
@@ -130,29 +141,14 @@ void orientAmong(const Eigen::MatrixXi& nearest, const Points& points, Points& n
   }
 }
 
-void requireSurface(const Points& points) {
-  if (points.cols() < 3) throw std::invalid_argument("points: three at least make a surface");
-}
-
-}  // namespace
-
-Points estimateNormals(const Points& points) {
-  requireSurface(points);
-  return normalsAmong(nearestPoints(points), points);
-}
-
 void orientOutwards(const Points& points, Points& normals) {
-  orientAmong(nearestPoints(points), points, normals);
+  orientOutwards(points, nearestPoints(points), normals);
 }
 
 Points outwardNormals(const Points& points) {
-  requireSurface(points);
-  return outwardNormals(points, nearestPoints(points));
-}
-
-Points outwardNormals(const Points& points, const Eigen::MatrixXi& nearest) {
-  Points normals = normalsAmong(nearest, points);
-  orientAmong(nearest, points, normals);
+  const Eigen::MatrixXi nearest = nearestPoints(points);
+  Points normals = estimateNormals(points, nearest);
+  orientOutwards(points, nearest, normals);
   return normals;
 }
 

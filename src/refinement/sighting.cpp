@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "sighting.hpp"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <vector>
@@ -27,6 +28,12 @@ bool faces(const PointCloud& seen, const Eigen::Vector3f& viewpoint) {
   return seen.normals.cwiseProduct(rays).sum() > 0.0F;
 }
 
+/// The openness of these normals with whatever signs: no direction has a larger mean square.
+double mostOpenness(const Points& normals) {
+  const Eigen::Matrix3f moment = normals * normals.transpose() / static_cast<float>(normals.cols());
+  return std::sqrt(Eigen::SelfAdjointEigenSolver<Eigen::Matrix3f>(moment).eigenvalues()[2]);
+}
+
 /// What the discs cover that reach to each point's farthest neighbour.
 double sampledArea(const Points& points, const Eigen::MatrixXi& nearest) {
   const Eigen::Index step = std::max<Eigen::Index>(1, points.cols() / kDiscs);
@@ -47,13 +54,15 @@ double sampledArea(const Points& points, const Eigen::MatrixXi& nearest) {
 double sampledArea(const Points& points) { return sampledArea(points, nearestPoints(points)); }
 
 Sighting sightingOf(const PointCloud& target, double organ_area) {
-  Sighting sighting;
   const Eigen::MatrixXi nearest = nearestPoints(target.points);
-  sighting.seen = {target.points, outwardNormals(target.points, nearest)};
-  const PointCloud& seen = sighting.seen;
-  const bool known = target.viewpoint && faces(seen, *target.viewpoint);
+  Sighting sighting{{target.points, estimateNormals(target.points, nearest)}, true, {}};
+  PointCloud& seen = sighting.seen;
   const double share = sampledArea(seen.points, nearest) / organ_area;
   const double most = kOpennessOverShare * (share - kLeastShare);
+  if (!target.viewpoint && mostOpenness(seen.normals) < most) return sighting;
+
+  orientOutwards(seen.points, nearest, seen.normals);
+  const bool known = target.viewpoint && faces(seen, *target.viewpoint);
   sighting.whole =
       openness(seen.normals) < (known ? std::min(most, kWholeOpennessFromViewpoint) : most);
   if (sighting.whole) return sighting;
