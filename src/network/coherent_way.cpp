@@ -39,8 +39,7 @@ void CoherentWay::fit(const Points& points, const Points& offsets, const Points&
     column[0] *= 1.0F + kFlowPlaneRounding;
     column[0] += kSquaredNoise * (1.0F + offsets.col(j).squaredNorm() / kSquaredReach);
   }
-  factor_.compute(covariance_);
-  if (factor_.info() != Eigen::Success) {
+  if (!factor_.compute(covariance_)) {
     throw std::runtime_error("the target's planes give no coherent motion of the source");
   }
   factor_.solveInPlace(gains_);

@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <Eigen/Cholesky>
-
-#include "kernels.hpp"
+#include "cholesky_factor.hpp"
 #include "unirit/point_cloud.hpp"
 
 namespace unirit {
@@ -15,7 +13,7 @@ namespace unirit {
 class CoherentWay {
  public:
   /// `kernels` must outlive it.
-  explicit CoherentWay(const Kernels& kernels) : kernels_(kernels) {}
+  explicit CoherentWay(const Kernels& kernels) : kernels_(kernels), factor_(kernels) {}
 
   /// Points p, the offsets o to points of their planes and the normals n, [3, N] each; allocates
   /// nothing where the number stays. Throws std::runtime_error where rounding leaves no solution.
@@ -39,7 +37,7 @@ class CoherentWay {
   Eigen::Matrix<float, Eigen::Dynamic, 3> coordinates_;  // of the points, in whole blocks
   Eigen::MatrixXf gaussians_;                            // e^(-|p_i - p_j|^2 / 2 l^2)
   Eigen::MatrixXf covariance_;
-  Eigen::LLT<Eigen::MatrixXf> factor_;
+  CholeskyFactor factor_;
   Eigen::VectorXf gains_;
 };
 

@@ -15,6 +15,7 @@ struct Loops {
   typedef float Vector __attribute__((vector_size(Lanes * 4)));
   typedef int IndexVector __attribute__((vector_size(Lanes * 4)));
   static constexpr int kWidth = Lanes * Vectors;
+  static constexpr int kColumns = 4;  // of a matrix that are factored together
 
   static Vector load(const float* from) {
     Vector vector;
@@ -118,6 +119,53 @@ struct Loops {
     }
   }
 
+  /// By columns, kColumns together: less what the columns before them explain, then one by the
+  /// other. What stands above the diagonal is never read.
+  static void cholesky(float* matrix, long order) {
+    for (long first = 0; first < order; first += kColumns) {
+      const long top = first / kWidth * kWidth;
+      for (long row = top; row < order; row += kWidth) subtractBefore(matrix, order, first, row);
+      for (long column = first; column < first + kColumns; ++column) {
+        float* factor = matrix + column * order;
+        const Vector scale = 1.0F / __builtin_sqrtf(factor[column]) - Vector{};
+        for (long row = top; row < order; row += Lanes) {
+          const Vector scaled = load(factor + row) * scale;
+          store(scaled, factor + row);
+        }
+        for (long later = column + 1; later < first + kColumns; ++later) {
+          subtractColumn(factor, top, order, factor[later], matrix + later * order);
+        }
+      }
+    }
+  }
+
+  static void subtractColumn(const float* factor, long top, long order, float share,
+                             float* column) {
+    for (long row = top; row < order; row += Lanes) {
+      store(load(column + row) - load(factor + row) * share, column + row);
+    }
+  }
+
+  /// From kWidth rows of kColumns columns.
+  static void subtractBefore(float* matrix, long order, long first, long row) {
+    float* columns = matrix + first * order + row;
+    Vector sums[kColumns][Vectors];
+    for (int c = 0; c < kColumns; ++c) {
+      for (int v = 0; v < Vectors; ++v) sums[c][v] = load(columns + c * order + v * Lanes);
+    }
+    for (long before = 0; before < first; ++before) {
+      const float* factor = matrix + before * order;
+      for (int v = 0; v < Vectors; ++v) {
+        const Vector rows = load(factor + row + v * Lanes);
+#pragma GCC unroll 4
+        for (int c = 0; c < kColumns; ++c) sums[c][v] -= rows * factor[first + c];
+      }
+    }
+    for (int c = 0; c < kColumns; ++c) {
+      for (int v = 0; v < Vectors; ++v) store(sums[c][v], columns + c * order + v * Lanes);
+    }
+  }
+
   /// x, y and z of up to as many queries as there are lanes; the rest are zero.
   static void loadQueries(const float* queries, long count, Vector (&coordinates)[3]) {
     float lanes[3][Lanes] = {};
@@ -196,9 +244,12 @@ struct Loops {
   static float sum(const Vector& vector) {
     float lanes[Lanes];
     store(vector, lanes);
-    float total = 0.0F;
-    for (const float lane : lanes) total += lane;
-    return total;
+#pragma GCC unroll 4
+    for (int half = Lanes / 2; half > 0; half /= 2) {
+#pragma GCC unroll 8
+      for (int lane = 0; lane < half; ++lane) lanes[lane] += lanes[lane + half];
+    }
+    return lanes[0];
   }
 
   static float affinities(const float* source, const OrientedPointsView& targets, const int* blocks,
@@ -300,8 +351,8 @@ struct Loops {
   }
 
   static constexpr Kernels kernels(InstructionSet instruction_set) {
-    return {instruction_set, kWidth, dense,     denseMaximum,     nearest,
-            affinities,      gather, gaussians, neighbourhoodSums};
+    return {instruction_set, kWidth,     dense,  denseMaximum, cholesky,
+            nearest,         affinities, gather, gaussians,    neighbourhoodSums};
   }
 };
 

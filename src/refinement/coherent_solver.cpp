@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "coherent_solver.hpp"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -42,7 +43,7 @@ CoherentSolver::CoherentSolver(const Points& source, const Eigen::MatrixXf& func
       information_(6, source.cols()),
       matrix_(3 * rank() + kPose, 3 * rank() + kPose),
       unknowns_(3 * rank() + kPose),
-      factor_(3 * rank() + kPose) {}
+      factor_(kernels) {}
 
 /// Each point's information matrix and gradient, and the parts of the normal equations that hold
 /// the pose. Residuals count from the reference, pose columns from where points lie now.
@@ -157,7 +158,7 @@ void CoherentSolver::movePose(Eigen::Index first, CoherentState& state) const {
 /// further observation of each.
 void CoherentSolver::learnDeviations(const CoherentState& state) {
   const Eigen::Matrix<float, kPose, kPose> corner =
-      factor_.matrixLLT().bottomRightCorner<kPose, kPose>();
+      factor_.matrixL().bottomRightCorner<kPose, kPose>();
   const Eigen::Matrix<float, kPose, kPose> inverse =
       corner.triangularView<Eigen::Lower>().solve(Eigen::Matrix<float, kPose, kPose>::Identity());
   const Eigen::Matrix<float, 1, kPose> variances = inverse.colwise().squaredNorm();
@@ -214,7 +215,7 @@ void CoherentSolver::displace(CoherentState& state) {
 
 void CoherentSolver::covarianceFactor(Eigen::MatrixXf& factor) const {
   factor.setIdentity(matrix_.rows(), 3 * rank());
-  factor_.matrixL().solveInPlace(factor);
+  factor_.matrixL().triangularView<Eigen::Lower>().solveInPlace(factor);
 }
 
 }  // namespace unirit

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 
 #include "correspondence.hpp"
+#include "network/cholesky_factor.hpp"
 #include "network/dense_layer.hpp"
 
 namespace unirit {
@@ -95,7 +95,7 @@ class CoherentSolver {
   Eigen::Matrix<float, kPose, 1> pose_gradient_;
   Eigen::MatrixXf matrix_;  // normal equations
   Eigen::VectorXf unknowns_;
-  Eigen::LLT<Eigen::MatrixXf> factor_;
+  CholeskyFactor factor_;
 };
 
 }  // namespace unirit

@@ -12,8 +12,9 @@ namespace unirit {
 /// A claim that is checked on every instruction set this processor has.
 class InstructionSetTest : public testing::TestWithParam<InstructionSet> {
  protected:
-  void SetUp() override { limitInstructionSet(GetParam()); }
-  void TearDown() override { limitInstructionSet(InstructionSet::kAvx512); }
+  /// Before the members of a test are made, not in SetUp.
+  InstructionSetTest() { limitInstructionSet(GetParam()); }
+  ~InstructionSetTest() override { limitInstructionSet(InstructionSet::kAvx512); }
 };
 
 inline std::string instructionSetName(const testing::TestParamInfo<InstructionSet>& info) {
