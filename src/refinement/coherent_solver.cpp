@@ -38,9 +38,12 @@ CoherentSolver::CoherentSolver(const Points& source, const Eigen::MatrixXf& func
       kernels_(kernels),
       team_(team),
       product_(kernels, {functions, Eigen::VectorXf::Zero(functions.rows())}, Activation::kNone),
+      displacement_(kernels, {functions.transpose(), Eigen::VectorXf::Zero(functions.cols())},
+                    Activation::kNone),
       rows_(gradientRow(3), source.cols()),
       products_(rows_.rows(), static_cast<Eigen::Index>(product_.paddedOutputs())),
       information_(6, source.cols()),
+      displaced_(3, static_cast<Eigen::Index>(displacement_.paddedOutputs())),
       matrix_(3 * rank() + kPose, 3 * rank() + kPose),
       unknowns_(3 * rank() + kPose),
       factor_(kernels) {}
@@ -204,13 +207,11 @@ void CoherentSolver::solve(const Correspondences& correspondences, const Trust& 
 }
 
 void CoherentSolver::displace(CoherentState& state) {
-  displaced_.setZero(3, source_.cols());
-  for (Eigen::Index k = 0; k < rank(); ++k) {
-    for (int axis = 0; axis < 3; ++axis) {
-      displaced_.row(axis) += state.coefficients(axis, k) * functions_.row(k);
-    }
-  }
-  state.displacements = displaced_;
+  coefficients_ = state.coefficients;
+  const RowsView input{coefficients_.data(), coefficients_.cols(), coefficients_.rows()};
+  kernels_.dense(displacement_.view(), input, 0, displacement_.view().panel_count,
+                 displaced_.data(), displaced_.cols());
+  state.displacements = displaced_.leftCols(source_.cols());
 }
 
 void CoherentSolver::covarianceFactor(Eigen::MatrixXf& factor) const {

@@ -82,15 +82,17 @@ class CoherentSolver {
   PosePrior deviations_;  // as learnt
   const Kernels& kernels_;
   ThreadTeam& team_;
-  DenseLayer product_;  // multiplies rows of N by the functions
-  RowMajor rows_;       // (6 rank + 21) x N: weighted functions, weighted pose columns, gradient
-  RowMajor products_;   // (6 rank + 21) x padded rank
+  DenseLayer product_;       // multiplies rows of N by the functions
+  DenseLayer displacement_;  // rows of coefficients by them
+  RowMajor rows_;      // (6 rank + 21) x N: weighted functions, weighted pose columns, gradient
+  RowMajor products_;  // (6 rank + 21) x padded rank
   PointRows<6> information_;  // xx xy xz yy yz zz of each point, in the source's frame
   PointRows<3> moved_;
   PointRows<3> normals_;  // in the source's frame, as the next
   PointRows<3> residuals_;
   PointRows<1> weights_;
-  Eigen::Matrix<float, 3, Eigen::Dynamic, Eigen::RowMajor> displaced_;
+  RowMajor coefficients_;
+  RowMajor displaced_;  // 3 x padded N
   Eigen::Matrix<float, kPose, kPose> pose_matrix_;
   Eigen::Matrix<float, kPose, 1> pose_gradient_;
   Eigen::MatrixXf matrix_;  // normal equations

@@ -190,16 +190,12 @@ void CorrespondenceEstimator::findAffinities(const PointCloud& source,
 /// From the sums of the affinities, while the target weights still are those.
 double CorrespondenceEstimator::fit(const Eigen::RowVectorXf& visibility, float target_background,
                                     float source_background) const {
-  double target = 0.0, source = 0.0, visible = 0.0;
-  for (long j = 0; j < target_count_; ++j) {
-    target += std::log(target_weights_.data()[j] + target_background);
-  }
-  for (Eigen::Index i = 0; i < visibility.size(); ++i) {
-    source +=
-        visibility[i] * std::log(source_sums_[static_cast<std::size_t>(i)] + source_background);
-    visible += visibility[i];
-  }
-  return target / static_cast<double>(target_count_) + source / std::max(visible, 1.0);
+  const Eigen::Map<const Eigen::ArrayXf> target_sums(target_weights_.data(), target_count_);
+  const Eigen::Map<const Eigen::ArrayXf> source_sums(source_sums_.data(), visibility.size());
+  const float target = (target_sums + target_background).log().mean();
+  const float source =
+      ((source_sums + source_background).log() * visibility.transpose().array()).sum();
+  return target + source / std::max(visibility.sum(), 1.0F);
 }
 
 void CorrespondenceEstimator::estimate(const PointCloud& source,
@@ -234,11 +230,11 @@ void CorrespondenceEstimator::estimate(const PointCloud& source,
       kernels_.gather(values, view(), nearbyOf(i), countOf(i), target_weights_.data(),
                       source_weight, sums.data());
       values += countOf(i) * kPointBlock;
-      const bool any = sums[0] > 0.0F;
       correspondences.mass[i] = sums[0];
+      if (sums[0] > 0.0F) sums /= sums[0];
       correspondences.positions.col(i) =
-          any ? Eigen::Vector3f(sums.segment<3>(1) / sums[0]) : source.points.col(i).eval();
-      correspondences.normals.col(i) = sums.tail<3>().stableNormalized();
+          sums[0] > 0.0F ? sums.segment<3>(1).eval() : source.points.col(i).eval();
+      correspondences.normals.col(i) = sums.tail<3>().normalized();
     }
   });
 }
