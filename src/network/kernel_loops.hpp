@@ -14,6 +14,7 @@ template <int Lanes, int TileRows, int Vectors>
 struct Loops {
   typedef float Vector __attribute__((vector_size(Lanes * 4)));
   typedef int IndexVector __attribute__((vector_size(Lanes * 4)));
+  typedef unsigned BitVector __attribute__((vector_size(Lanes * 4)));
   static constexpr int kWidth = Lanes * Vectors;
   static constexpr int kColumns = 4;  // of a matrix that are factored together
 
@@ -197,25 +198,25 @@ struct Loops {
     }
   }
 
-  /// e^x for x <= 0, to a relative 5e-6 (1e-6 above -20); zero below -87. By e^x = 2^n e^r,
-  /// |r| <= ln 2 / 2, and the Taylor series of e^r.
-  static Vector exponential(Vector x) {
-    const Vector lowest = -87.0F - Vector{};
-    const IndexVector underflows = x < lowest;
-    x = underflows ? lowest : x;
+  static constexpr float kLog2E = 1.44269504F;
+
+  /// 2^x for x <= 0, to a relative 5e-6 (1e-6 above -29); zero below -125.55. By 2^x = 2^n 2^f,
+  /// |f| <= 1/2, and the polynomial that is exact at zero and else closest to 2^f.
+  static Vector powerOfTwo(Vector x) {
     // Adding 1.5 * 2^23 rounds to a whole number, which then stands in the low bits
-    const Vector shifted = x * 1.44269504F + 12582912.0F;
-    const Vector r = x - (shifted - 12582912.0F) * 0.693147181F;
-    IndexVector n;
-    __builtin_memcpy(&n, &shifted, sizeof(n));
+    const Vector shifted = x + 12582912.0F;
+    const Vector f = x - (shifted - 12582912.0F);
     const Vector series =
         1.0F +
-        r * (1.0F +
-             r * (0.5F + r * (1.0F / 6 + r * (1.0F / 24 + r * (1.0F / 120 + r * (1.0F / 720))))));
-    const IndexVector bits = (n - 0x4B400000 + 127) << 23;
+        f * (0.693147004F +
+             f * (0.240222424F + f * (0.0555073359F + f * (0.00967151299F + f * 0.00132647273F))));
+    BitVector n, bits;
+    __builtin_memcpy(&n, &shifted, sizeof(n));
+    __builtin_memcpy(&bits, &series, sizeof(bits));
+    bits += n << 23;  // into the exponent
     Vector power;
     __builtin_memcpy(&power, &bits, sizeof(power));
-    return underflows ? Vector{} : series * power;
+    return x < -125.55F - Vector{} ? Vector{} : power;
   }
 
   /// Affinities of one source point to the targets from j on.
@@ -224,7 +225,7 @@ struct Loops {
     const Vector dx = load(targets.position[0] + j) - source[0];
     const Vector dy = load(targets.position[1] + j) - source[1];
     const Vector dz = load(targets.position[2] + j) - source[2];
-    const Vector closeness = exponential(view.exponent * (dx * dx + dy * dy + dz * dz));
+    const Vector closeness = powerOfTwo(kLog2E * view.exponent * (dx * dx + dy * dy + dz * dz));
     if (view.normals == NormalUse::kNone) return closeness;
     const Vector cosine = load(targets.normal[0] + j) * source[3] +
                           load(targets.normal[1] + j) * source[4] +
@@ -295,7 +296,8 @@ struct Loops {
         const Vector dx = load(targets[0] + j) - query[0];
         const Vector dy = load(targets[1] + j) - query[1];
         const Vector dz = load(targets[2] + j) - query[2];
-        store(exponential(exponent * (dx * dx + dy * dy + dz * dz)), values + q * target_count + j);
+        store(powerOfTwo(kLog2E * exponent * (dx * dx + dy * dy + dz * dz)),
+              values + q * target_count + j);
       }
     }
   }
@@ -319,7 +321,7 @@ struct Loops {
           const Vector dx = query[0] - point[0];
           const Vector dy = query[1] - point[1];
           const Vector dz = query[2] - point[2];
-          Vector weight = exponential(exponent * (dx * dx + dy * dy + dz * dz));
+          Vector weight = powerOfTwo(kLog2E * exponent * (dx * dx + dy * dy + dz * dz));
           for (int size = 0; size < kNeighbourhoods; ++size) {
             weights[size][i] = weight;
             weight *= weight;
