@@ -21,7 +21,7 @@ constexpr int kRank = 48;
 // A view tells little of the pose, a whole surface nearly all
 constexpr PosePrior kViewPose{0.07F, 0.035F};
 constexpr PosePrior kWholePose{0.2F, 0.1F};
-constexpr Eigen::Index kCoarsePoints = 384;  // where the search begins afar
+constexpr Eigen::Index kCoarsePoints = 256;  // where the search begins afar
 constexpr float kWidestSigma = 0.4F;         // where the pose alone is sought
 constexpr float kFirstSigma = 0.12F;         // where pose and displacement are sought
 constexpr float kNarrowSigma = 0.06F;        // where either ends that has few points
