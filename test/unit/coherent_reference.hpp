@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #pragma once
 
-#include <Eigen/Dense>
+#include <Eigen/Cholesky>
+#include <Eigen/Geometry>
 
 #include "refinement/coherent_solver.hpp"
 
@@ -42,6 +43,10 @@ inline Eigen::Matrix3d crossProduct(const Eigen::Vector3d& v) {
 struct NormalEquations {
   Eigen::MatrixXd matrix;
   Eigen::VectorXd right;
+
+  Eigen::MatrixXd covariance() const {
+    return matrix.ldlt().solve(Eigen::MatrixXd::Identity(matrix.rows(), matrix.cols()));
+  }
 };
 
 /// `moved`: 3 x N, where the points lie in the source's frame, about which rotations turn.
@@ -94,7 +99,7 @@ inline void solve(const NormalEquations& equations, State& state) {
 /// Most likely deviations given the pose and its covariance, the prior's as a fourth observation.
 inline Deviations learnt(const NormalEquations& equations, const State& state,
                          const PosePrior& prior) {
-  const Eigen::MatrixXd covariance = equations.matrix.inverse().bottomRightCorner<6, 6>();
+  const Eigen::MatrixXd covariance = equations.covariance().bottomRightCorner<6, 6>();
   const auto learn = [](double before, const Eigen::Vector3d& value, double variance) {
     return std::sqrt((before * before + value.squaredNorm() + variance) / 4.0);
   };

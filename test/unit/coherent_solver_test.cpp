@@ -121,7 +121,7 @@ TEST_P(CoherentSolving, CovarianceIsThatOfTheDenseProblem) {
   ThreadTeam team(2);
   CoherentSolver fast = solver(team);
   CoherentState state = start();
-  const Eigen::MatrixXd covariance = equations(exact(state), kPriorDeviations).matrix.inverse();
+  const Eigen::MatrixXd covariance = equations(exact(state), kPriorDeviations).covariance();
   fast.solve(seen_, kTrust, state);
   Eigen::MatrixXf in_single;
   fast.covarianceFactor(in_single);

@@ -8,7 +8,7 @@
 #include <stdexcept>
 
 #include "instruction_set_test.hpp"
-#include "network_reference.hpp"
+#include "network_inputs.hpp"
 
 namespace unirit {
 namespace {
@@ -37,7 +37,7 @@ class CoherentWayTest : public InstructionSetTest {
 
   static float meanLength(const Points& vectors) { return vectors.colwise().norm().mean(); }
 
-  Points points_ = reference::surfacePoints(kFlowPlanes, 1), normals_;
+  Points points_ = test::surfacePoints(kFlowPlanes, 1), normals_;
   CoherentWay way_{selectKernels()};
 };
 
@@ -65,7 +65,7 @@ TEST_P(CoherentWayTest, findsASmoothDeformationOfPointsNotGivenToIt) {
     return bent;
   };
   way_.fit(points_, bend(points_), normals_);
-  const Points others = reference::surfacePoints(100, 2);
+  const Points others = test::surfacePoints(100, 2);
   EXPECT_LT(meanLength(ways(others) - bend(others)), 0.5F * meanLength(bend(others)));
 }
 

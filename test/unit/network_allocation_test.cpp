@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "allocation_counter.hpp"
-#include "network_reference.hpp"
+#include "network_inputs.hpp"
 
 namespace unirit {
 namespace {
@@ -18,12 +18,12 @@ TEST_F(NetworkAllocation, theCounterCounts) {
 }
 
 TEST_F(NetworkAllocation, nothingIsAllocatedAfterTheFirstCall) {
-  const Points source = reference::randomPoints(1100, 1);  // more than are read at once
-  const Points target = reference::randomPoints(700, 2);
-  const Points queries = reference::randomPoints(317, 3);
+  const Points source = test::randomPoints(1100, 1);  // more than are read at once
+  const Points target = test::randomPoints(700, 2);
+  const Points queries = test::randomPoints(317, 3);
   for (const Pairing pairing : {Pairing::kNearest, Pairing::kOffsets}) {
     for (const int threads : {1, 2}) {
-      Network network(reference::loudWeights(pairing), {8, pairing}, threads);
+      Network network(test::loudWeights(pairing), {8, pairing}, threads);
       Points displacements;
       const auto forward = [&] {
         network.estimateRigid(source, target);

@@ -3,13 +3,13 @@
 
 #include <limits>
 
-#include "network_reference.hpp"
+#include "network_inputs.hpp"
 
 namespace unirit {
 namespace {
 
-using reference::loudWeights;
-using reference::randomPoints;
+using test::loudWeights;
+using test::randomPoints;
 
 /// The sentence of the exception that `work` must throw.
 template <class Exception, class Work>

@@ -2,15 +2,15 @@
 #include <gtest/gtest.h>
 
 #include "instruction_set_test.hpp"
-#include "network_reference.hpp"
+#include "network_inputs.hpp"
 #include "unirit/sampling.hpp"
 
 namespace unirit {
 namespace {
 
-using reference::loudWeights;
-using reference::randomPoints;
-using reference::shuffled;
+using test::loudWeights;
+using test::randomPoints;
+using test::shuffled;
 
 /// Everything a forward pass puts out.
 struct Output {

@@ -2,14 +2,15 @@
 #include <gtest/gtest.h>
 
 #include "instruction_set_test.hpp"
+#include "network_inputs.hpp"
 #include "network_reference.hpp"
 
 namespace unirit {
 namespace {
 
-using reference::loudWeights;
-using reference::randomPoints;
-using reference::surfacePoints;
+using test::loudWeights;
+using test::randomPoints;
+using test::surfacePoints;
 
 constexpr double kTolerance = 1e-4;         // of the cloud's half extent
 constexpr double kSavingsTolerance = 1e-5;  // what leaving out repeated products may change

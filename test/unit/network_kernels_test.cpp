@@ -3,7 +3,7 @@
 
 #include "instruction_set_test.hpp"
 #include "network/dense_layer.hpp"
-#include "network_reference.hpp"
+#include "network_inputs.hpp"
 
 namespace unirit {
 namespace {
@@ -48,7 +48,7 @@ TEST_P(Kernel, denseIsWeightTimesInputPlusBias) {
 }
 
 TEST_P(Kernel, neighbourhoodSumsWeighByEverSmallerGaussians) {
-  const Points points = reference::randomPoints(35, 1), queries = reference::randomPoints(18, 2);
+  const Points points = test::randomPoints(35, 1), queries = test::randomPoints(18, 2);
   const RowMajor values = randomRows(35, kAveraged);
   const long asked = 17;
   RowMajor sums = RowMajor::Constant(18, kNeighbourhoods * kAveraged, -1.0F);
@@ -101,9 +101,9 @@ TEST_P(Kernel, maximumIsTheLargestOutputOverTheRows) {
 }
 
 TEST_P(Kernel, nearestIsExactAndTheFirstAmongEquals) {
-  Points targets = reference::randomPoints(67, 5);
+  Points targets = test::randomPoints(67, 5);
   targets.col(40) = targets.col(7);
-  Points queries = reference::randomPoints(53, 6);
+  Points queries = test::randomPoints(53, 6);
   queries.col(52) = targets.col(40);
   std::vector<int> indices(53, -1);
   selectKernels().nearest(queries.data(), 53, targets.data(), 67, indices.data());
