@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <cstdlib>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -74,11 +75,10 @@ void startAgainWithRightKernels(char** arguments) {
 }
 
 /// A rival that allocates anew in every call should not wait for the system's pages each time,
-/// which doubles some of them.
+/// which doubles the time of some.
 void keepMemory() {
-  constexpr int kNever = 1 << 30;
-  mallopt(M_MMAP_THRESHOLD, kNever);
-  mallopt(M_TRIM_THRESHOLD, kNever);
+  mallopt(M_MMAP_MAX, 0);
+  mallopt(M_TRIM_THRESHOLD, std::numeric_limits<int>::max());
 }
 
 }  // namespace

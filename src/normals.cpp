@@ -98,14 +98,10 @@ class Orientation {
   std::priority_queue<Edge> edges_;
 };
 
-void requireSurface(const Points& points) {
-  if (points.cols() < 3) throw std::invalid_argument("points: three at least make a surface");
-}
-
 }  // namespace
 
 Points estimateNormals(const Points& points, const Eigen::MatrixXi& nearest) {
-  requireSurface(points);
+  if (points.cols() < 3) throw std::invalid_argument("points: three at least make a surface");
   Points normals(3, points.cols());
   Eigen::SelfAdjointEigenSolver<Eigen::Matrix3f> solver;
   for (Eigen::Index i = 0; i < points.cols(); ++i) {

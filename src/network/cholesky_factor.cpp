@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSD-3-Clause
 #include "cholesky_factor.hpp"
 
-#include <cmath>
-
 namespace unirit {
 
 bool CholeskyFactor::compute(const Eigen::MatrixXf& matrix) {
@@ -15,8 +13,7 @@ bool CholeskyFactor::compute(const Eigen::MatrixXf& matrix) {
   values.bottomRows(order_ - size_).setZero();
   values.diagonal().tail(order_ - size_).setOnes();
   kernels_.cholesky(values_.data(), order_);
-  // What is not a number stays so down to the last column
-  return size_ == 0 || std::isfinite(values(size_ - 1, size_ - 1));
+  return values.diagonal().allFinite();
 }
 
 void CholeskyFactor::solveInPlace(Eigen::VectorXf& b) const {

@@ -17,6 +17,7 @@ struct Loops {
   typedef unsigned BitVector __attribute__((vector_size(Lanes * 4)));
   static constexpr int kWidth = Lanes * Vectors;
   static constexpr int kColumns = 4;  // of a matrix that are factored together
+  static_assert(kWidth % kColumns == 0);
 
   static Vector load(const float* from) {
     Vector vector;
@@ -121,7 +122,7 @@ struct Loops {
   }
 
   /// By columns, kColumns together: less what the columns before them explain, then one by the
-  /// other. What stands above the diagonal is never read.
+  /// other. What stands above the diagonal is carried along and enters nothing below it.
   static void cholesky(float* matrix, long order) {
     for (long first = 0; first < order; first += kColumns) {
       const long top = first / kWidth * kWidth;
@@ -147,7 +148,7 @@ struct Loops {
     }
   }
 
-  /// From kWidth rows of kColumns columns.
+  /// What the columns before them explain, from kWidth rows of kColumns columns.
   static void subtractBefore(float* matrix, long order, long first, long row) {
     float* columns = matrix + first * order + row;
     Vector sums[kColumns][Vectors];
@@ -198,10 +199,8 @@ struct Loops {
     }
   }
 
-  static constexpr float kLog2E = 1.44269504F;
-
-  /// 2^x for x <= 0, to a relative 5e-6 (1e-6 above -29); zero below -125.55. By 2^x = 2^n 2^f,
-  /// |f| <= 1/2, and the polynomial that is exact at zero and else closest to 2^f.
+  /// 2^x for x <= 0, to a relative 2e-7; zero below -125.55. By 2^x = 2^n 2^f, |f| <= 1/2, and the
+  /// polynomial that is exact at zero and else closest to 2^f.
   static Vector powerOfTwo(Vector x) {
     // Adding 1.5 * 2^23 rounds to a whole number, which then stands in the low bits
     const Vector shifted = x + 12582912.0F;
@@ -219,13 +218,19 @@ struct Loops {
     return x < -125.55F - Vector{} ? Vector{} : power;
   }
 
+  /// e^(exponent * squared distance); the rounding of their product leaves it a relative 5e-6.
+  static Vector gaussian(float exponent, Vector squared_distance) {
+    constexpr float kLog2E = 1.44269504F;
+    return powerOfTwo(kLog2E * exponent * squared_distance);
+  }
+
   /// Affinities of one source point to the targets from j on.
   static Vector affinity(const float* source, const OrientedPointsView& targets, long j,
                          const AffinityView& view) {
     const Vector dx = load(targets.position[0] + j) - source[0];
     const Vector dy = load(targets.position[1] + j) - source[1];
     const Vector dz = load(targets.position[2] + j) - source[2];
-    const Vector closeness = powerOfTwo(kLog2E * view.exponent * (dx * dx + dy * dy + dz * dz));
+    const Vector closeness = gaussian(view.exponent, dx * dx + dy * dy + dz * dz);
     if (view.normals == NormalUse::kNone) return closeness;
     const Vector cosine = load(targets.normal[0] + j) * source[3] +
                           load(targets.normal[1] + j) * source[4] +
@@ -296,8 +301,7 @@ struct Loops {
         const Vector dx = load(targets[0] + j) - query[0];
         const Vector dy = load(targets[1] + j) - query[1];
         const Vector dz = load(targets[2] + j) - query[2];
-        store(powerOfTwo(kLog2E * exponent * (dx * dx + dy * dy + dz * dz)),
-              values + q * target_count + j);
+        store(gaussian(exponent, dx * dx + dy * dy + dz * dz), values + q * target_count + j);
       }
     }
   }
@@ -321,7 +325,7 @@ struct Loops {
           const Vector dx = query[0] - point[0];
           const Vector dy = query[1] - point[1];
           const Vector dz = query[2] - point[2];
-          Vector weight = powerOfTwo(kLog2E * exponent * (dx * dx + dy * dy + dz * dz));
+          Vector weight = gaussian(exponent, dx * dx + dy * dy + dz * dz);
           for (int size = 0; size < kNeighbourhoods; ++size) {
             weights[size][i] = weight;
             weight *= weight;

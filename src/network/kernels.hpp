@@ -74,8 +74,9 @@ struct Kernels {
   /// maxima[o] = max(maxima[o], max over rows of weight * input[row] + bias).
   void (*denseMaximum)(const LayerView& layer, const RowsView& input, float* maxima);
 
-  /// Replaces the lower half of a symmetric matrix by that of its Cholesky factor; what stands
-  /// above the diagonal afterwards means nothing. The order is a multiple of the panel width.
+  /// Replaces the lower half of a symmetric matrix, by columns, by that of its Cholesky factor,
+  /// whose diagonal is not finite where there is none; what stands above it then means nothing. The
+  /// order is a multiple of the panel width.
   void (*cholesky)(float* matrix, long order);
 
   /// indices[q] = the first of the targets nearest to query q; both are x y z, x y z, ...

@@ -43,6 +43,7 @@ CoherentSolver::CoherentSolver(const Points& source, const Eigen::MatrixXf& func
       rows_(gradientRow(3), source.cols()),
       products_(rows_.rows(), static_cast<Eigen::Index>(product_.paddedOutputs())),
       information_(6, source.cols()),
+      coefficients_(3, rank()),
       displaced_(3, static_cast<Eigen::Index>(displacement_.paddedOutputs())),
       matrix_(3 * rank() + kPose, 3 * rank() + kPose),
       unknowns_(3 * rank() + kPose),

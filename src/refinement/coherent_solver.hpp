@@ -83,7 +83,7 @@ class CoherentSolver {
   const Kernels& kernels_;
   ThreadTeam& team_;
   DenseLayer product_;       // multiplies rows of N by the functions
-  DenseLayer displacement_;  // rows of coefficients by them
+  DenseLayer displacement_;  // multiplies rows of coefficients by the functions
   RowMajor rows_;      // (6 rank + 21) x N: weighted functions, weighted pose columns, gradient
   RowMajor products_;  // (6 rank + 21) x padded rank
   PointRows<6> information_;  // xx xy xz yy yz zz of each point, in the source's frame

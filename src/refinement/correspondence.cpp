@@ -188,8 +188,8 @@ void CorrespondenceEstimator::findAffinities(const PointCloud& source,
 }
 
 /// From the sums of the affinities, while the target weights still are those.
-double CorrespondenceEstimator::fit(const Eigen::RowVectorXf& visibility, float target_background,
-                                    float source_background) const {
+float CorrespondenceEstimator::fit(const Eigen::RowVectorXf& visibility, float target_background,
+                                   float source_background) const {
   const Eigen::Map<const Eigen::ArrayXf> target_sums(target_weights_.data(), target_count_);
   const Eigen::Map<const Eigen::ArrayXf> source_sums(source_sums_.data(), visibility.size());
   const float target = (target_sums + target_background).log().mean();
@@ -230,11 +230,11 @@ void CorrespondenceEstimator::estimate(const PointCloud& source,
       kernels_.gather(values, view(), nearbyOf(i), countOf(i), target_weights_.data(),
                       source_weight, sums.data());
       values += countOf(i) * kPointBlock;
+      const bool any = sums[0] > 0.0F;
       correspondences.mass[i] = sums[0];
-      if (sums[0] > 0.0F) sums /= sums[0];
       correspondences.positions.col(i) =
-          sums[0] > 0.0F ? sums.segment<3>(1).eval() : source.points.col(i).eval();
-      correspondences.normals.col(i) = sums.tail<3>().normalized();
+          any ? Eigen::Vector3f(sums.segment<3>(1) / sums[0]) : source.points.col(i).eval();
+      correspondences.normals.col(i) = sums.tail<3>().stableNormalized();
     }
   });
 }

@@ -54,8 +54,8 @@ class CorrespondenceEstimator {
   long blocksNear(const Eigen::Vector3f& point, float reach, int* nearby) const;
   int* nearbyOf(Eigen::Index source);
   long& countOf(Eigen::Index source);
-  double fit(const Eigen::RowVectorXf& visibility, float target_background,
-             float source_background) const;
+  float fit(const Eigen::RowVectorXf& visibility, float target_background,
+            float source_background) const;
   void findNearby(const PointCloud& source, float reach);
   void findAffinities(const PointCloud& source, const AffinityView& affinity);
   OrientedPointsView view() const;

@@ -28,7 +28,8 @@ bool faces(const PointCloud& seen, const Eigen::Vector3f& viewpoint) {
   return seen.normals.cwiseProduct(rays).sum() > 0.0F;
 }
 
-/// The openness of these normals with whatever signs: no direction has a larger mean square.
+/// No choice of signs makes the normals more open: along any direction, a mean is at most the root
+/// of the mean square.
 double mostOpenness(const Points& normals) {
   const Eigen::Matrix3f moment = normals * normals.transpose() / static_cast<float>(normals.cols());
   return std::sqrt(Eigen::SelfAdjointEigenSolver<Eigen::Matrix3f>(moment).eigenvalues()[2]);
@@ -55,11 +56,13 @@ double sampledArea(const Points& points) { return sampledArea(points, nearestPoi
 
 Sighting sightingOf(const PointCloud& target, double organ_area) {
   const Eigen::MatrixXi nearest = nearestPoints(target.points);
-  Sighting sighting{{target.points, estimateNormals(target.points, nearest)}, true, {}};
+  Sighting sighting;
+  sighting.seen = {target.points, estimateNormals(target.points, nearest)};
   PointCloud& seen = sighting.seen;
   const double share = sampledArea(seen.points, nearest) / organ_area;
   const double most = kOpennessOverShare * (share - kLeastShare);
-  if (!target.viewpoint && mostOpenness(seen.normals) < most) return sighting;
+  sighting.whole = !target.viewpoint && mostOpenness(seen.normals) < most;
+  if (sighting.whole) return sighting;
 
   orientOutwards(seen.points, nearest, seen.normals);
   const bool known = target.viewpoint && faces(seen, *target.viewpoint);

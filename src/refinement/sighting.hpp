@@ -10,8 +10,8 @@ namespace unirit {
 
 /// What a target shows of the organ. Lengths in the clouds' unit, half the organ's extent.
 struct Sighting {
-  PointCloud seen;                     ///< the target; a part with normals towards the eye
-  bool whole = false;                  ///< all of the surface, else a part of it from one side
+  PointCloud seen;     ///< the target, with normals: of a part towards the eye, else of any sign
+  bool whole = false;  ///< all of the surface, else a part of it from one side
   std::optional<Eigen::Vector3f> eye;  ///< from where a part is seen
 };
 

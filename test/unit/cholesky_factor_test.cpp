@@ -51,6 +51,11 @@ TEST_P(CholeskyFactorTest, saysWhereThereIsNone) {
     Eigen::MatrixXf indefinite = matrix;
     indefinite(pivot, pivot) = -1.0F;
     EXPECT_FALSE(factor_.compute(indefinite)) << pivot;
+    Eigen::VectorXf solution = Eigen::VectorXf::Ones(37);
+    factor_.solveInPlace(solution);
+    EXPECT_FALSE(solution.allFinite()) << pivot;
+    indefinite(pivot, pivot) = std::numeric_limits<float>::infinity();
+    EXPECT_FALSE(factor_.compute(indefinite)) << pivot;
   }
   EXPECT_FALSE(factor_.compute(Eigen::MatrixXf::Zero(6, 6)));
   matrix(30, 2) = std::numeric_limits<float>::quiet_NaN();

@@ -127,6 +127,18 @@ TEST(Correspondence, FitBestWhereTheSourceLiesOnTheTarget) {
   }
 }
 
+TEST(Correspondence, WithUnsignedNormalsTheirSignsDoNotMatter) {
+  const PointCloud seen = target(500);
+  PointCloud turned = seen;
+  for (Eigen::Index j = 0; j < turned.size(); j += 3) turned.normals.col(j) *= -1.0F;
+  const Correspondences expected = estimated(source(), seen, wide(NormalUse::kUnsigned));
+  const Correspondences found = estimated(source(), turned, wide(NormalUse::kUnsigned));
+  EXPECT_EQ(found.mass, expected.mass);
+  EXPECT_EQ(found.positions, expected.positions);
+  EXPECT_EQ(found.normals, expected.normals);
+  EXPECT_NE(estimated(source(), turned, wide()).mass, expected.mass);
+}
+
 TEST(Correspondence, HaveTheSameBitsForAnyNumberOfThreads) {
   for (const float sigma : {0.02F, 0.1F, 0.7F}) {
     const Attraction attraction{sigma, 0.1F, NormalUse::kSigned, 4.0F};

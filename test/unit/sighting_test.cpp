@@ -58,6 +58,12 @@ TEST(Sighting, TellsWholeSurfacesFromParts) {
   }
 }
 
+TEST(Sighting, OfAMoreOpenSurfaceThanItsAreaAllowsIsAPart) {
+  const Points open = unitSphere(1024, -0.6F);  // its mean normal has a length of 0.2
+  EXPECT_FALSE(sightingOf({open, {}}, sampledArea(open) / 0.8).whole);
+  EXPECT_TRUE(sightingOf({open, {}}, sampledArea(open) / 0.85).whole);
+}
+
 TEST(Sighting, OfAPartIsFromTheViewpointItFaces) {
   const PointCloud cap{unitSphere(1024, 0.3F), {}, Eigen::Vector3f(0, 0, 5)};
   const Sighting sighting = sightingOf(cap, 4.0 * M_PI);
