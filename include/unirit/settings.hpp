@@ -72,14 +72,14 @@ struct PlausibilitySettings {
   double max_residual_left = 1.22;  ///< RefinementQuality::residual_left
   double max_missing = 0.15;        ///< RefinementQuality::missing
   double min_confidence = 0.24;     ///< RefinementQuality::confidence
-  double max_surprise = 1.34;       ///< RefinementQuality::surprise
-  double max_flip_gain = 0.318;     ///< RefinementQuality::flip_gain
-  double max_displacement = 0.228;  ///< largest non-rigid displacement, over extent
-  double max_stretch = 2.33;        ///< DisplacementStatistics::stretch
-  double min_compression = 0.165;   ///< DisplacementStatistics::compression
+  double max_surprise = 1.29;       ///< RefinementQuality::surprise
+  double max_flip_gain = 0.244;     ///< RefinementQuality::flip_gain
+  double max_displacement = 0.23;   ///< largest non-rigid displacement, over extent
+  double max_stretch = 2.34;        ///< DisplacementStatistics::stretch
+  double min_compression = 0.17;    ///< DisplacementStatistics::compression
   double max_folded = 0.05;         ///< DisplacementStatistics::folded_fraction
   double max_turn = 60.0;           ///< of the organ from the start [degree]
-  double max_joint = 0.575;         ///< root mean square of turn, 95th percentile of the residual,
+  double max_joint = 0.58;          ///< root mean square of turn, 95th percentile of the residual,
                                     ///< displacement, missing, confidence and surprise, over limits
   double max_jump_translation = 0.10;  ///< from the last accepted pose, at the organ's centroid [m]
   double max_jump_rotation = 60.0;     ///< from the last accepted pose [degree]
