@@ -155,6 +155,25 @@ std::string toHalfBytes(const Matrix& matrix, const std::string& name) {
   return bytes;
 }
 
+/// He takes a layer's inputs to be of one size and all to say something of their own. But offsets
+/// are shorter than points, and among both clouds' features what is read of one point would go
+/// unheard.
+void weighInputs(const LayerShape& shape, Pairing pairing, Eigen::MatrixXf& weight) {
+  constexpr float kOffsetScale = 10.0F;
+  constexpr int kFeatures = 2 * kFeatureSize;
+  if (shape.name == "flow.source_encoder.0" || shape.name == "flow.decoder.0") {
+    weight.middleCols(kFlowFirstVector, 4 * kFlowVectors) *= kOffsetScale;
+  } else if (shape.name == "flow.target_encoder.0") {
+    weight.rightCols(3) *= kOffsetScale;
+  } else if (shape.name == "nonrigid.decoder.0") {
+    const float inputs = static_cast<float>(shape.inputs);
+    const float alone = std::sqrt(inputs / (inputs - kFeatures));  // as a layer without features
+    weight.leftCols(3) *= alone;
+    weight.rightCols(shape.inputs - kFeatures - 3) *=
+        pairing == Pairing::kNearest ? alone * kOffsetScale : alone;
+  }
+}
+
 }  // namespace
 
 void validate(const Weights& weights) {
@@ -213,7 +232,6 @@ void writeWeights(const Weights& weights, const std::string& path) {
 
 Weights randomWeights(Pairing pairing, unsigned seed) {
   constexpr double kLastLayerScale = 0.05, kLastFlowScale = 0.005;
-  constexpr float kOffsetScale = 10.0F;  // offsets are shorter than points by as much
   Random random(seed);
   Weights weights;
   weights.pairing = pairing;
@@ -229,10 +247,7 @@ Weights randomWeights(Pairing pairing, unsigned seed) {
     layer.weight = Eigen::MatrixXf::NullaryExpr(shape.outputs, shape.inputs, [&] {
       return static_cast<float>(deviation * random.normal());
     });
-    if (shape.name == "flow.source_encoder.0" || shape.name == "flow.decoder.0") {
-      layer.weight.middleCols(kFlowFirstVector, 4 * kFlowVectors) *= kOffsetScale;
-    }
-    if (shape.name == "flow.target_encoder.0") layer.weight.rightCols(3) *= kOffsetScale;
+    weighInputs(shape, pairing, layer.weight);
     layer.bias = Eigen::VectorXf::Zero(shape.outputs);
   }
   for (auto& [name, layer] : weights.layers) {

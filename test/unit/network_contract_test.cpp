@@ -180,6 +180,21 @@ TEST(NetworkContract, randomWeightsStartAtTheIdentity) {
   }
 }
 
+TEST(NetworkContract, randomWeightsOfAPointAreHeardAmongTheFeatures) {
+  constexpr double kOffset = 100.0;  // ten times the weights, squared
+  const auto point_over_features = [](Pairing pairing, Eigen::Index first, Eigen::Index columns) {
+    const Eigen::MatrixXf weight = randomWeights(pairing, 1).layers.at("nonrigid.decoder.0").weight;
+    return weight.middleCols(first, columns).squaredNorm() /
+           weight.middleCols(3, 2 * kFeatureSize).squaredNorm();
+  };
+  const Eigen::Index pair = 3 + 2 * kFeatureSize;
+  EXPECT_NEAR(point_over_features(Pairing::kNone, 0, 3), 1.0, 0.1);
+  EXPECT_NEAR(point_over_features(Pairing::kRow, 0, 3), 0.5, 0.05);
+  EXPECT_NEAR(point_over_features(Pairing::kRow, pair, 3), 0.5, 0.05);
+  EXPECT_NEAR(point_over_features(Pairing::kNearest, 0, 3), 0.5, 0.05);
+  EXPECT_NEAR(point_over_features(Pairing::kNearest, pair, 3), kOffset * 0.5, kOffset * 0.05);
+}
+
 TEST(NetworkContract, costsAreThoseOfThePaper) {
   const auto giga = [](int iterations, bool with_savings, Pairing pairing = Pairing::kNearest) {
     return 1e-9 * multiplyAdds(1024, 1024, iterations, pairing, with_savings);

@@ -39,7 +39,8 @@ Weights readWeights(const std::string& path);
 void writeWeights(const Weights& weights, const std::string& path);
 
 /// He-initialised weights (Kaiming normal, zero biases), last layers scaled by 0.05, that of the
-/// flow by 0.005, the rigid decoder's last bias a unit quaternion: starts near the identity. For
+/// flow by 0.005, the rigid decoder's last bias a unit quaternion: starts near the identity. What
+/// the non-rigid decoder reads of one point weighs as much as both clouds' features together. For
 /// tests and training.
 Weights randomWeights(Pairing pairing, unsigned seed);
 
