@@ -1,4 +1,4 @@
-#!/usr/bin/env python3
+#!/usr/bin/python3
 # SPDX-License-Identifier: BSD-3-Clause
 """Draws what unirit_benchmark wrote: plot_benchmark.py FOLDER [OUTPUT]
 

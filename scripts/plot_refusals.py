@@ -1,4 +1,4 @@
-#!/usr/bin/env python3
+#!/usr/bin/python3
 # SPDX-License-Identifier: BSD-3-Clause
 """Tells what the plausibility checks refused: plot_refusals.py FOLDER [--plots DIR] [--set-limits]
 

@@ -1,4 +1,4 @@
-#!/usr/bin/env python3
+#!/usr/bin/python3
 # SPDX-License-Identifier: BSD-3-Clause
 """Finds the rivals' parameters: tune_rivals.py BENCHMARK CASES OUTPUT [PROTOCOL...]
 
