@@ -16,6 +16,7 @@ void requireValid(const DriftClouds& clouds, const BcpdSettings& settings) {
   requireWithin("lambda", settings.lambda, 0.0, kInfinity, false);
   requireWithin("omega", settings.omega, 0.0, 1.0, true);
   requireWithin("gamma", settings.gamma, 0.0, kInfinity, false);
+  requireWithin("kernel_tolerance", settings.kernel_tolerance, 0.0, 1.0, false);
 }
 
 /// Volume of the box around the points: outliers are uniform in it.
@@ -27,7 +28,7 @@ double boxVolume(const Eigen::Matrix3Xd& points) {
 
 Drift driftBayesian(const DriftClouds& clouds, const BcpdSettings& settings) {
   requireValid(clouds, settings);
-  const GaussianBasis basis(clouds.source, settings.beta);
+  const GaussianBasis basis(clouds.source, settings.beta, settings.kernel_tolerance);
   const double odds = settings.omega / (1.0 - settings.omega) *
                       static_cast<double>(clouds.source.cols()) / boxVolume(clouds.target);
   Drift drift;

@@ -14,6 +14,7 @@ void requireValid(const DriftClouds& clouds, const CpdSettings& settings) {
   requireWithin("beta", settings.beta, 0.0, kInfinity, false);
   requireWithin("lambda", settings.lambda, 0.0, kInfinity, false);
   requireWithin("w", settings.outliers, 0.0, 1.0, true);
+  requireWithin("kernel_tolerance", settings.kernel_tolerance, 0.0, 1.0, false);
 }
 
 /// Alternates expectation and `maximise`, which moves drift.source and returns the energy of its
@@ -58,7 +59,7 @@ Drift driftRigidly(const DriftClouds& clouds, const CpdSettings& settings) {
 
 Drift driftCoherently(const DriftClouds& clouds, const CpdSettings& settings) {
   requireValid(clouds, settings);
-  const GaussianBasis basis(clouds.source, settings.beta);
+  const GaussianBasis basis(clouds.source, settings.beta, settings.kernel_tolerance);
   Eigen::Matrix3Xd coefficients = Eigen::Matrix3Xd::Zero(3, basis.values().cols());
   Drift drift = alternate(clouds, settings, [&](const Responsibilities& explained, Drift& current) {
     const Eigen::Matrix3Xd residuals =

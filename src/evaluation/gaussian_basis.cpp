@@ -8,8 +8,6 @@
 namespace unirit {
 namespace {
 
-constexpr double kTolerance = 1e-7;
-
 Eigen::ArrayXd kernel(const Eigen::Matrix3Xd& points, const Eigen::Vector3d& centre, double width) {
   return ((points.colwise() - centre).colwise().squaredNorm() / (-2.0 * width * width))
       .array()
@@ -19,13 +17,14 @@ Eigen::ArrayXd kernel(const Eigen::Matrix3Xd& points, const Eigen::Vector3d& cen
 
 }  // namespace
 
-GaussianBasis::GaussianBasis(const Eigen::Matrix3Xd& points, double width) : width_(width) {
+GaussianBasis::GaussianBasis(const Eigen::Matrix3Xd& points, double width, double tolerance)
+    : width_(width) {
   Eigen::ArrayXd unexplained = Eigen::ArrayXd::Ones(points.cols());
   std::vector<Eigen::Index> pivots;
   for (Eigen::Index rank = 0; rank < points.cols(); ++rank) {
     Eigen::Index pivot = 0;
     const double largest = unexplained.maxCoeff(&pivot);
-    if (largest < kTolerance) break;
+    if (largest < tolerance) break;
     if (rank == values_.cols()) {  // grow in steps, most bases are small
       values_.conservativeResize(points.cols(), std::min(points.cols(), 2 * rank + 64));
     }

@@ -69,7 +69,7 @@ TEST(Responsibilities, OfTargetsOutOfReachVanish) {
 TEST(GaussianBasis, ItsProductsAreTheKernel) {
   const Eigen::Matrix3Xd points = organ(150, 3);
   for (const double width : {0.3, 1.0, 2.0}) {
-    const GaussianBasis basis(points, width);
+    const GaussianBasis basis(points, width, 1e-7);
     Eigen::MatrixXd kernel(points.cols(), points.cols());
     for (Eigen::Index i = 0; i < points.cols(); ++i) {
       kernel.col(i) = ((points.colwise() - points.col(i)).colwise().squaredNorm().array() /
@@ -82,13 +82,17 @@ TEST(GaussianBasis, ItsProductsAreTheKernel) {
     EXPECT_LT((product - kernel).cwiseAbs().maxCoeff(), 2e-7) << width;
     EXPECT_LT((basis.at(points) - basis.values()).cwiseAbs().maxCoeff(), 1e-4) << width;
   }
-  EXPECT_LT(GaussianBasis(points, 2.0).values().cols(), 120);  // smooth fields are few
+  const auto functions = [&](double tolerance) {
+    return GaussianBasis(points, 2.0, tolerance).values().cols();
+  };
+  EXPECT_LT(functions(1e-7), 120);  // smooth fields are few
+  EXPECT_LT(functions(1e-7), functions(1e-9));
 }
 
 TEST(GaussianBasis, FitIsTheMaximisationOfCoherentPointDrift) {
   // (diag(w) G + ridge I) W = w r, displacements G W: the form in which the paper has it.
   const Eigen::Matrix3Xd points = organ(80, 4);
-  const GaussianBasis basis(points, 1.0);
+  const GaussianBasis basis(points, 1.0, 1e-7);
   const Eigen::RowVectorXd weights = Eigen::RowVectorXd::LinSpaced(80, 0.0, 2.0);
   const Eigen::Matrix3Xd residuals = (bent(points) - points) * weights.asDiagonal();
   const double ridge = 0.05;
@@ -165,6 +169,12 @@ TEST(Drifts, RefuseEmptyCloudsAndSettingsOutOfRange) {
   EXPECT_THROW(driftRigidly({cloud, cloud, none}, cpd), std::invalid_argument);
   BcpdSettings bcpd;
   bcpd.lambda = 0.0;
+  EXPECT_THROW(driftBayesian({cloud, cloud, none}, bcpd), std::invalid_argument);
+  cpd = {};
+  cpd.kernel_tolerance = 0.0;
+  EXPECT_THROW(driftCoherently({cloud, cloud, none}, cpd), std::invalid_argument);
+  bcpd = {};
+  bcpd.kernel_tolerance = 0.0;
   EXPECT_THROW(driftBayesian({cloud, cloud, none}, bcpd), std::invalid_argument);
 }
 

@@ -38,6 +38,8 @@ struct CpdSettings {
   double outliers = 0.1;    ///< w: share of outliers expected in the target, in [0, 1)
   double tolerance = 1e-5;  ///< ends where the likelihood changes by less than this share
   int iterations = 150;     ///< at most
+  /// Of the kernel's matrix, each element 1 on the diagonal, what the displacements leave out.
+  double kernel_tolerance = 1e-7;
 
   template <class Visitor>
   void visit(Visitor&& visitor) {
@@ -46,6 +48,7 @@ struct CpdSettings {
     visitor("w", outliers);
     visitor("tolerance", tolerance);
     visitor("iterations", iterations);
+    visitor("kernel_tolerance", kernel_tolerance);
   }
 };
 
@@ -59,6 +62,7 @@ struct BcpdSettings {
   int settling = 30;        ///< iterations before the tolerance is asked
   int iterations = 500;     ///< at most
   bool scale = true;        ///< similarity rather than rigid transform beside the displacements
+  double kernel_tolerance = 1e-7;  ///< as of CpdSettings
 
   template <class Visitor>
   void visit(Visitor&& visitor) {
@@ -70,6 +74,7 @@ struct BcpdSettings {
     visitor("settling", settling);
     visitor("iterations", iterations);
     visitor("scale", scale);
+    visitor("kernel_tolerance", kernel_tolerance);
   }
 };
 
