@@ -53,11 +53,15 @@ all=(--data "$train" --phantoms 6 --hold-out 24)
 network fpt 1200 "${all[@]}" --points 512 --method fpt
 network norigid 1200 "${all[@]}" --points 512 --pairing nearest --alpha 1
 network row 1000 "${all[@]}" --points 128 --pairing row --target paired --partial-share 0 --rotation 0
+
+# few NAME COUNT OPTION...: a network of the first livers alone.
 livers=("$train"/liver/*)
-for count in 1 2 4 8; do
-  choose "$output/organs/liver$count" "${livers[@]:0:count}"
-  network "liver$count" 1800 --points 128 --pairing nearest --data "$output/organs/liver$count" --hold-out 100
-done
+few() {
+  choose "$output/organs/liver$2" "${livers[@]:0:$2}"
+  network "$1" 1800 --points 128 --pairing nearest --data "$output/organs/liver$2" --hold-out 100 "${@:3}"
+}
+for count in 1 2 4 8; do few "liver$count" "$count"; done
+few liver1varied 1 --subjects 20
 
 # The network alone is judged in all cases: its limits are opened.
 open=plausibility/max_residual=1:plausibility/max_residual_p95=1:plausibility/min_inliers=0
@@ -92,11 +96,13 @@ compare zero_shot --data "$output/organs/small_bowel" --label "small bowel (zero
   --methods "${rivals[@]}" "$fpt" "${ours[@]}"
 
 choose "$output/organs/liver" "$test"/liver/*
-few=()
-for count in 1 2 4 8; do few+=("UniRiT of $count livers@unirit:$(weightsOf "liver$count"):$alone"); done
+of_few=()
+for count in 1 2 4 8 1varied; do
+  of_few+=("UniRiT of $count livers@unirit:$(weightsOf "liver$count"):$alone")
+done
 compare liver --data "$output/organs/liver" --label "livers (test split)" --pairs 8 \
   --protocols permuted resampled caseb partial \
-  --methods identity best-rigid icp cpd bcpd "${few[@]}" "UniRiT@unirit:$alone:$published" \
+  --methods identity best-rigid icp cpd bcpd "${of_few[@]}" "UniRiT@unirit:$alone:$published" \
   "UniRiT by flow@unirit:$alone" unirit
 
 compare paired --data "$test" --label "real organs (test split)" --protocols paired permuted \
