@@ -6,10 +6,10 @@
 namespace unirit {
 
 /// Functions over space whose products are the Gaussian kernel's matrix over some points:
-/// basis * basis' = G with G(i,j) = exp(-|p_i - p_j|^2 / (2 width^2)), to a tolerance in each
-/// diagonal element. A displacement field of a Gaussian process is then a sum of few of them, and
-/// its prior energy trace(W' G W) the squared norm of the coefficients. By pivoted Cholesky
-/// decomposition.
+/// basis * basis' = G with G(i,j) = exp(-|p_i - p_j|^2 / (2 width^2)), to `tolerance`, in
+/// (0, 1), in each diagonal element. A displacement field of a Gaussian process is then a sum of
+/// few of them, and its prior energy trace(W' G W) the squared norm of the coefficients. By pivoted
+/// Cholesky decomposition.
 class GaussianBasis {
  public:
   /// `points`: 3 x N.

@@ -155,11 +155,10 @@ std::string toHalfBytes(const Matrix& matrix, const std::string& name) {
   return bytes;
 }
 
-/// He takes a layer's inputs to be of one size and all to say something of their own. But offsets
-/// are shorter than points, and among both clouds' features what is read of one point would go
-/// unheard.
+/// He's rule supposes inputs of one size that all say something of their own. But offsets are
+/// shorter than points, and among both clouds' features what is read of one point would go unheard.
 void weighInputs(const LayerShape& shape, Pairing pairing, Eigen::MatrixXf& weight) {
-  constexpr float kOffsetScale = 10.0F;
+  constexpr float kOffsetScale = 10.0F;  // offsets are about a tenth as long as points
   constexpr int kFeatures = 2 * kFeatureSize;
   if (shape.name == "flow.source_encoder.0" || shape.name == "flow.decoder.0") {
     weight.middleCols(kFlowFirstVector, 4 * kFlowVectors) *= kOffsetScale;

@@ -193,6 +193,15 @@ TEST(NetworkContract, randomWeightsOfAPointAreHeardAmongTheFeatures) {
   EXPECT_NEAR(point_over_features(Pairing::kRow, pair, 3), 0.5, 0.05);
   EXPECT_NEAR(point_over_features(Pairing::kNearest, 0, 3), 0.5, 0.05);
   EXPECT_NEAR(point_over_features(Pairing::kNearest, pair, 3), kOffset * 0.5, kOffset * 0.05);
+
+  const auto layers = randomWeights(Pairing::kOffsets, 1).layers;
+  const auto offset_over_point = [&](const char* layer, Eigen::Index first) {
+    const Eigen::MatrixXf& weight = layers.at(layer).weight;
+    return weight.middleCols(first, 3).squaredNorm() / weight.leftCols(3).squaredNorm();
+  };
+  EXPECT_NEAR(offset_over_point("flow.target_encoder.0", 3), kOffset, 0.4 * kOffset);
+  EXPECT_NEAR(offset_over_point("flow.source_encoder.0", kFlowFirstVector), kOffset, 0.4 * kOffset);
+  EXPECT_NEAR(offset_over_point("flow.decoder.0", kFlowFirstVector), kOffset, 0.4 * kOffset);
 }
 
 TEST(NetworkContract, costsAreThoseOfThePaper) {

@@ -69,7 +69,6 @@ TEST(Responsibilities, OfTargetsOutOfReachVanish) {
 TEST(GaussianBasis, ItsProductsAreTheKernel) {
   const Eigen::Matrix3Xd points = organ(150, 3);
   for (const double width : {0.3, 1.0, 2.0}) {
-    const GaussianBasis basis(points, width, 1e-7);
     Eigen::MatrixXd kernel(points.cols(), points.cols());
     for (Eigen::Index i = 0; i < points.cols(); ++i) {
       kernel.col(i) = ((points.colwise() - points.col(i)).colwise().squaredNorm().array() /
@@ -78,9 +77,12 @@ TEST(GaussianBasis, ItsProductsAreTheKernel) {
                           .matrix()
                           .transpose();
     }
-    const Eigen::MatrixXd product = basis.values() * basis.values().transpose();
-    EXPECT_LT((product - kernel).cwiseAbs().maxCoeff(), 2e-7) << width;
-    EXPECT_LT((basis.at(points) - basis.values()).cwiseAbs().maxCoeff(), 1e-4) << width;
+    for (const double tolerance : {1e-5, 1e-7, 1e-9}) {
+      const GaussianBasis basis(points, width, tolerance);
+      const Eigen::MatrixXd product = basis.values() * basis.values().transpose();
+      EXPECT_LT((product - kernel).cwiseAbs().maxCoeff(), 2.0 * tolerance) << width;
+      EXPECT_LT((basis.at(points) - basis.values()).cwiseAbs().maxCoeff(), 1e-4) << width;
+    }
   }
   const auto functions = [&](double tolerance) {
     return GaussianBasis(points, 2.0, tolerance).values().cols();
@@ -158,6 +160,26 @@ TEST(BayesianDrift, KeepsTheSizeWithoutScale) {
   const Drift drift = driftBayesian(clouds, settings);
   EXPECT_EQ(drift.pose.scale, 1.0);
   EXPECT_LT(rms(drift.source - source), 0.1);  // 0.3 to the target
+}
+
+/// How far apart two kernel tolerances leave the points after some iterations.
+template <class Settings>
+double apart(Drift (*drift)(const DriftClouds&, const Settings&), double tolerance, double other) {
+  const Eigen::Matrix3Xd source = organ(60, 5), none(3, 0);
+  const auto moved = [&](double kernel_tolerance) {
+    Settings settings;
+    settings.iterations = 5;
+    settings.kernel_tolerance = kernel_tolerance;
+    return drift({source, bent(source), none}, settings).source;
+  };
+  return rms(moved(tolerance) - moved(other));
+}
+
+TEST(Drifts, LeaveOutOfTheKernelWhatTheyAreTold) {
+  EXPECT_GT(apart(driftCoherently, 0.3, 1e-9), 1e-4);
+  EXPECT_GT(apart(driftBayesian, 0.3, 1e-9), 1e-4);
+  EXPECT_LT(apart(driftCoherently, 1e-9, 1e-11), 1e-7);
+  EXPECT_LT(apart(driftBayesian, 1e-9, 1e-11), 1e-7);
 }
 
 TEST(Drifts, RefuseEmptyCloudsAndSettingsOutOfRange) {

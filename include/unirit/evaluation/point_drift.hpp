@@ -38,7 +38,8 @@ struct CpdSettings {
   double outliers = 0.1;    ///< w: share of outliers expected in the target, in [0, 1)
   double tolerance = 1e-5;  ///< ends where the likelihood changes by less than this share
   int iterations = 150;     ///< at most
-  /// Of the kernel's matrix, each element 1 on the diagonal, what the displacements leave out.
+  /// In (0, 1): the kernel's matrix, 1 on its diagonal, is approximated until no element of the
+  /// diagonal is off by more.
   double kernel_tolerance = 1e-7;
 
   template <class Visitor>
@@ -79,8 +80,8 @@ struct BcpdSettings {
 };
 
 /// Rigid coherent point drift without scale (Myronenko & Song, Point Set Registration: Coherent
-/// Point Drift, 2010). beta and lambda have no part in it. The three throw std::invalid_argument
-/// on clouds without points or settings out of range.
+/// Point Drift, 2010). beta, lambda and kernel_tolerance have no part in it. The three throw
+/// std::invalid_argument on clouds without points or settings out of range.
 Drift driftRigidly(const DriftClouds& clouds, const CpdSettings& settings);
 
 /// Non-rigid coherent point drift, same paper.

@@ -40,8 +40,8 @@ void writeWeights(const Weights& weights, const std::string& path);
 
 /// He-initialised weights (Kaiming normal, zero biases), last layers scaled by 0.05, that of the
 /// flow by 0.005, the rigid decoder's last bias a unit quaternion: starts near the identity. What
-/// the non-rigid decoder reads of one point weighs as much as both clouds' features together. For
-/// tests and training.
+/// the non-rigid decoder reads of one point counts as much as both clouds' features together,
+/// offsets taken to be a tenth as long as points. For tests and training.
 Weights randomWeights(Pairing pairing, unsigned seed);
 
 }  // namespace unirit
