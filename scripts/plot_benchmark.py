@@ -190,6 +190,8 @@ def main(folder, output=None):
     output = output or os.path.join(folder, "plots")
     os.makedirs(output, exist_ok=True)
     matplotlib.rcParams["svg.hashsalt"] = "unirit"  # the same rows give the same files
+    colours = plt.cm.tab20([*range(0, 20, 2), *range(1, 20, 2)])  # ten as usual, then paler ones
+    matplotlib.rcParams["axes.prop_cycle"] = plt.cycler(color=colours)
     shares, deviations = collections.defaultdict(dict), collections.defaultdict(dict)
     for protocol, methods in read_rows(folder).items():
         kind, _, percent = protocol.partition(":")
