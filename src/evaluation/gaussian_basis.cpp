@@ -53,7 +53,9 @@ Eigen::MatrixXd GaussianBasis::at(const Eigen::Matrix3Xd& places) const {
   for (Eigen::Index i = 0; i < places.cols(); ++i) {
     kernels.col(i) = kernel(pivots_, places.col(i), width_).matrix();
   }
-  pivot_rows_.triangularView<Eigen::Lower>().solveInPlace(kernels);
+  if (kernels.size() > 0) {  // Eigen would refer to the first of none
+    pivot_rows_.triangularView<Eigen::Lower>().solveInPlace(kernels);
+  }
   return kernels.transpose();
 }
 

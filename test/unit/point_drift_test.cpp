@@ -89,6 +89,7 @@ TEST(GaussianBasis, ItsProductsAreTheKernel) {
   };
   EXPECT_LT(functions(1e-7), 120);  // smooth fields are few
   EXPECT_LT(functions(1e-7), functions(1e-9));
+  EXPECT_EQ(GaussianBasis(points, 2.0, 1e-7).at(Eigen::Matrix3Xd(3, 0)).rows(), 0);
 }
 
 TEST(GaussianBasis, FitIsTheMaximisationOfCoherentPointDrift) {
