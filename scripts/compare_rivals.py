@@ -8,9 +8,9 @@ CPD is a checkout of github.com/gadomski/cpd, BCPD one of github.com/ohirose/bcp
 program of that name, each CASE a folder with source.ply and target.ply as unirit_benchmark reads
 them. Builds both origins in a temporary folder (cmake, g++, gcc, Eigen, OpenBLAS), runs either side
 for the same number of iterations with the same parameters on the same clouds, and prints the
-largest distance between moved points, in units of the source's RMS radius. Fails above TOLERANCE, which
-is above the six decimals that BCPD writes. Our displacement fields are given KERNEL_TOLERANCE: what
-they leave out by default can grow in iterations that have not settled.
+largest distance between moved points, in units of the source's RMS radius. Fails above TOLERANCE,
+which is above the six decimals that BCPD writes. Our displacement fields are given KERNEL_TOLERANCE:
+what they leave out by default can grow in iterations that have not settled.
 """
 import os
 import subprocess
