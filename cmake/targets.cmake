@@ -3,9 +3,10 @@
 if(UNIRIT_SANITIZE)
   add_compile_options(-fsanitize=address,undefined -fno-sanitize-recover=undefined
                       -fno-omit-frame-pointer -g1 -O1)
-  add_link_options(-fsanitize=address,undefined)
-  # Eigen puts blocks of its own about what the sanitizer allocates, unless it is told that it need
-  # not: less would be seen, and what is compiled without sanitizers could not free it.
+  # Libraries call their own copies of templates, not those of a test, compiled without sanitizers.
+  add_link_options(-fsanitize=address,undefined LINKER:-Bsymbolic-functions)
+  # With the sanitizer, Eigen would ask for more memory than it needs and hand out a place inside:
+  # what reads just before it would go unseen, and code compiled without could not free it.
   add_compile_definitions(EIGEN_MALLOC_ALREADY_ALIGNED=1)
 endif()
 
@@ -21,8 +22,6 @@ endfunction()
 function(unirit_add_library target)
   add_library(${target} ${ARGN})
   unirit_configure(${target})
-  # A library calls its own copy of a template's function, not a program's, compiled otherwise.
-  target_link_options(${target} PRIVATE LINKER:-Bsymbolic-functions)
   set_target_properties(${target} PROPERTIES INSTALL_RPATH "$ORIGIN")
   install(TARGETS ${target}
     ARCHIVE DESTINATION ${UNIRIT_LIBRARY_DESTINATION}

@@ -4,8 +4,8 @@
        --iterations N
 
 Trains the networks of include/unirit/network/architecture.hpp by python's torch, on clouds of noise
-that lie ready in memory, and prints pairs a second of the clock and a second of a core's time (see
-training_speed.py). Needs Debian's python3-torch.
+that lie ready in memory, and prints pairs a second of the clock and a second of a core's time.
+training_speed.py runs it with the environment in which it is fastest. Needs Debian's python3-torch.
 """
 import argparse
 import time
@@ -250,7 +250,8 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("pairing", choices=PARAMETERS)
-    parser.add_argument("--alpha", type=float, required=True, help="weight of the global loss; 0: the published rigid module alone")
+    parser.add_argument("--alpha", type=float, required=True,
+                        help="weight of the global loss; 0: the published rigid module alone")
     for option in ("--cores", "--batch", "--points", "--steps", "--iterations"):
         parser.add_argument(option, type=int, required=True)
     train(parser.parse_args())

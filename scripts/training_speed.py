@@ -9,7 +9,8 @@ core's time, which other work on the machine disturbs less: the published rigid 
 published modules, and the flow module. The python side (torch_training.py) has the same layers,
 batch, points, loss, iterations, an optimiser step after each pass, as many decoded points, and the
 decoder's global columns once a pair. Its clouds lie ready in memory; unirit_train makes its
-pairs meanwhile, on the same cores.
+pairs meanwhile, on the same cores. Torch has glibc keep its memory, as unirit_train does itself,
+and OpenBLAS on one thread or on all cores, whichever is faster.
 
 Needs Debian's python3-torch, which nothing else here does, so it is not in packages.txt.
 """
@@ -23,8 +24,8 @@ import tempfile
 import time
 
 DECODED_POINTS = 64  # of each pair, by the published non-rigid module
-# Memory of a step that goes back to the system is cleared page by page in the next: unirit_train
-# keeps it, and so does torch by these, up to three times as fast.
+# Memory of a step that goes back to the system is cleared page by page in the next: with glibc's own
+# settings torch is up to three times slower.
 KEEP_MEMORY = {"MALLOC_MMAP_MAX_": "0", "MALLOC_TRIM_THRESHOLD_": str(1 << 40),
                "MALLOC_TOP_PAD_": str(64 << 20)}
 PHASES = {"rigid": ("nearest", 0.0), "both": ("nearest", 0.5),
@@ -87,14 +88,14 @@ def speed_of_unirit(options, phase, cores):
             pairs / (used[2] - used[0]))
 
 
-def speed_of_torch(options, phase, cores):
+def speed_of_torch(options, phase, cores, blas_threads):
     script = os.path.join(os.path.dirname(os.path.abspath(__file__)), "torch_training.py")
     pairing, alpha = PHASES[phase]
     with start_on(cores, [
             sys.executable, script, pairing, "--alpha", str(alpha), "--cores", str(len(cores)),
             "--batch", str(options.batch), "--points", str(options.points), "--steps",
             str(options.steps), "--iterations", str(options.iterations)],
-                  OPENBLAS_NUM_THREADS=str(len(cores)), **KEEP_MEMORY) as train:
+                  OPENBLAS_NUM_THREADS=str(blas_threads), **KEEP_MEMORY) as train:
         output = train.stdout.read()
     if train.returncode != 0:
         sys.exit("python's torch failed")
@@ -111,7 +112,8 @@ def compare(options):
     for count in options.cores:
         cores = every_core[:count]
         for phase in PHASES:
-            speeds = [speed_of_torch(options, phase, cores) + speed_of_unirit(options, phase, cores)
+            speeds = [max(speed_of_torch(options, phase, cores, threads)
+                          for threads in {1, count}) + speed_of_unirit(options, phase, cores)
                       for _ in range(options.repeats)]
             torch, torch_core, unirit, unirit_core = map(statistics.median, zip(*speeds))
             print(f"| {count} | {phase} | {unirit:.1f} ({unirit / options.batch:.2f}) "

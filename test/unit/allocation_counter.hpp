@@ -16,7 +16,7 @@ inline std::atomic<long> allocations{0};
 
 // glibc lets a program put its own functions before these; operator new ends here as well. The
 // sanitizers bring their own, so with them nothing is counted and the test is skipped.
-#if defined(__GLIBC__) && !defined(UNIRIT_SANITIZE)
+#if defined(__GLIBC__) && !defined(UNIRIT_SANITIZE) && !defined(__SANITIZE_ADDRESS__)
 #define UNIRIT_COUNTS_ALLOCATIONS
 extern "C" {
 void* __libc_malloc(std::size_t size);

@@ -82,9 +82,9 @@ class RefinementKernel : public InstructionSetTest {
     }
     const float origin[6] = {};
     const int block = 0;
-    float sums[kPointBlock] = {}, affinities[kPointBlock];
-    selectKernels().affinities(origin, targets.view(), &block, 1, {x, NormalUse::kNone}, affinities,
-                               sums);
+    std::vector<float> sums(kPointBlock), affinities(kPointBlock);
+    selectKernels().affinities(origin, targets.view(), &block, 1, {x, NormalUse::kNone},
+                               affinities.data(), sums.data());
     for (const float affinity : affinities) EXPECT_EQ(affinity, sums[0]) << "another lane";
     return sums[0];
   }
@@ -135,10 +135,10 @@ TEST_P(RefinementKernel, GatheredSumsAreThoseOfDoublePrecision) {
       const AffinityView view{-4.0F, use};
       std::vector<float> values, target_sums(kTargets);
       affinities(targets, view, values, target_sums);
-      float sums[7];
+      std::vector<float> sums(7);
       selectKernels().gather(values.data(), targets.view(), kSomeBlocks.data(),
                              static_cast<long>(kSomeBlocks.size()), weights.data(), source_weight,
-                             sums);
+                             sums.data());
       double expected[7] = {};
       for (long j = 0; j < kTargets; ++j) {
         if (!isNamed(j)) continue;
@@ -152,7 +152,7 @@ TEST_P(RefinementKernel, GatheredSumsAreThoseOfDoublePrecision) {
           expected[4 + axis] += weight * sign * targets.normal(axis, j);
         }
       }
-      for (int k = 0; k < 7; ++k) {
+      for (std::size_t k = 0; k < 7; ++k) {
         EXPECT_NEAR(static_cast<double>(sums[k]), expected[k], 1e-6 * expected[0]) << "sum " << k;
       }
     }
