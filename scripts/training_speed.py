@@ -24,8 +24,8 @@ import tempfile
 import time
 
 DECODED_POINTS = 64  # of each pair, by the published non-rigid module
-# Memory of a step that goes back to the system is cleared page by page in the next: with glibc's own
-# settings torch is up to three times slower.
+# Memory of a step that goes back to the system is cleared page by page in the next: with settings
+# of glibc's own torch is up to three times slower.
 KEEP_MEMORY = {"MALLOC_MMAP_MAX_": "0", "MALLOC_TRIM_THRESHOLD_": str(1 << 40),
                "MALLOC_TOP_PAD_": str(64 << 20)}
 PHASES = {"rigid": ("nearest", 0.0), "both": ("nearest", 0.5),
