@@ -135,7 +135,7 @@ TEST_P(RefinementKernel, GatheredSumsAreThoseOfDoublePrecision) {
       const AffinityView view{-4.0F, use};
       std::vector<float> values, target_sums(kTargets);
       affinities(targets, view, values, target_sums);
-      std::vector<float> sums(7);
+      std::vector<float> sums(7, std::nanf(""));  // to be overwritten
       selectKernels().gather(values.data(), targets.view(), kSomeBlocks.data(),
                              static_cast<long>(kSomeBlocks.size()), weights.data(), source_weight,
                              sums.data());
